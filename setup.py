@@ -1,6 +1,6 @@
 """Metadata of the pip package; colcon builds the same sources through CMakeLists.txt."""
 
-from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
@@ -47,6 +47,12 @@ TEST = [
 
 LINT = ["ruff>=0.11", "mypy>=1.15", "types-PyYAML"]
 
+
+def files(folder: str) -> list[str]:
+    """Return the files of a folder of the checkout."""
+    return sorted(str(path) for path in Path(folder).glob("*") if path.is_file())
+
+
 setup(
     name="walk-optimizer",
     version="0.1.0",
@@ -71,9 +77,9 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/walk_optimizer"]),
         (SHARE, ["package.xml"]),
-        (f"{SHARE}/config", glob("config/*.yaml")),
-        (f"{SHARE}/launch", glob("launch/*.py")),
-        (f"{SHARE}/urdf", glob("urdf/*")),
+        (f"{SHARE}/config", files("config")),
+        (f"{SHARE}/launch", files("launch")),
+        (f"{SHARE}/urdf", files("urdf")),
     ],
     zip_safe=False,
     install_requires=[

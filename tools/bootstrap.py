@@ -6,7 +6,8 @@ so a second run only compares digests.
 The wheels bring the whole of rclpy, but three things are left to do:
 
 - their CMake files name the include folders of the machine that built them (`rewrite_include_paths`);
-- `walk_optimizer_interfaces` has to be generated and compiled (`build_interfaces`);
+- `walk_optimizer_interfaces` has to be generated and compiled (`build_interfaces`), and an editable
+  install leaves out data files, so the share folder is made of links (`link_share_files`);
 - processes need AMENT_PREFIX_PATH to find packages (`write_environment_hook`). LD_LIBRARY_PATH is set
   by a start-up hook of the wheels themselves.
 """
@@ -25,6 +26,7 @@ ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 PYTHON = VENV / "bin" / "python"
 INTERFACES = ROOT / "walk_optimizer_interfaces"
+SHARED_FOLDERS = ("config", "launch", "urdf")
 BUILD = VENV / "build" / "walk_optimizer_interfaces"
 
 # The wheels exist for these versions of Python.
@@ -46,6 +48,7 @@ def main() -> int:
         make_environment()
         install_packages()
         build_interfaces()
+        link_share_files()
     except BootstrapError as error:
         print(f"bootstrap: {error}", file=sys.stderr)
         return 1
@@ -86,7 +89,7 @@ def install_packages() -> None:
     if is_done("packages", state):
         return
     say("installing the packages that setup.py names")
-    pip("setuptools>=64", "wheel")
+    pip("--upgrade", "setuptools>=64")
     pip("--no-build-isolation", "--editable", f"{ROOT}[dev]")
     rewrite_include_paths()
     write_environment_hook()
@@ -139,6 +142,23 @@ def build_interfaces() -> None:
     ):
         run_quietly([cmake, *arguments], environment)
     mark_done("interfaces", state)
+
+
+def link_share_files() -> None:
+    """Fill `share/walk_optimizer` and the package index with links to the checkout.
+
+    The links are to files, not to folders: a later `pip install` replaces a link to a file, but
+    would write through a link to a folder into the checkout.
+    """
+    share = Path("share", "walk_optimizer")
+    files = [path for folder in SHARED_FOLDERS for path in (ROOT / folder).glob("*") if path.is_file()]
+    links = {share / path.relative_to(ROOT): path for path in [*files, ROOT / "package.xml"]}
+    links[Path("share/ament_index/resource_index/packages/walk_optimizer")] = ROOT / "resource/walk_optimizer"
+    shutil.rmtree(VENV / share, ignore_errors=True)
+    for link, target in links.items():
+        (VENV / link).parent.mkdir(parents=True, exist_ok=True)
+        (VENV / link).unlink(missing_ok=True)
+        (VENV / link).symlink_to(target)
 
 
 def require(program: str) -> str:
