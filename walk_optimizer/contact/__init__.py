@@ -1,0 +1,1 @@
+"""Contact of the feet with the ground: complementarity pairs, schedules and impact."""

@@ -1,0 +1,1 @@
+"""The planar walker: its parameters, kinematics and Hamiltonian dynamics; nothing of optimisation."""

@@ -1,0 +1,148 @@
+"""Parameters of the walker and of its knee springs, validated once, here."""
+
+import hashlib
+import json
+import math
+from dataclasses import asdict, dataclass, fields
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from walk_optimizer.errors import ConfigurationError, InvalidRequestError
+from walk_optimizer.resources import config_file, read_yaml
+
+
+class SpringMode(StrEnum):
+    """What the optimiser may choose about the knee springs (report section IV)."""
+
+    NONE = "none"
+    STIFFNESS = "stiffness"
+    STIFFNESS_AND_EQUILIBRIUM = "stiffness_and_equilibrium"
+
+    @classmethod
+    def parse(cls, name: str) -> "SpringMode":
+        """Return the mode of that name.
+
+        Raises:
+            InvalidRequestError: no such mode; the message lists them.
+        """
+        try:
+            return cls(name)
+        except ValueError:
+            allowed = ", ".join(mode.value for mode in cls)
+            raise InvalidRequestError(f"unknown spring mode {name!r}; allowed are {allowed}") from None
+
+
+@dataclass(frozen=True)
+class KneeSpring:
+    """Torsion spring, the same on both knees.
+
+    Attributes:
+        stiffness: K in [N m/rad].
+        equilibrium: q_eq in [rad]; pi is a stretched knee.
+    """
+
+    stiffness: float = 0.0
+    equilibrium: float = math.pi
+
+
+# What the equations of motion and contact depend on; the rest are bounds of the optimisation.
+DYNAMIC_PARAMETERS = (
+    "hip_mass",
+    "upper_leg_mass",
+    "lower_leg_mass",
+    "upper_leg_length",
+    "lower_leg_length",
+    "gravity",
+    "friction_coefficient",
+)
+
+
+@dataclass(frozen=True)
+class WalkerParameters:
+    """The walker of report section II: five point masses, two segments a leg, point feet.
+
+    Attributes:
+        hip_mass: Mass at the hip in [kg].
+        upper_leg_mass: Mass at the middle of each upper leg in [kg].
+        lower_leg_mass: Mass at the middle of each lower leg in [kg].
+        upper_leg_length: Hip to knee in [m].
+        lower_leg_length: Knee to foot in [m].
+        gravity: Gravitational acceleration in [m/s^2].
+        friction_coefficient: Coulomb friction mu of foot and ground [-].
+        hip_angle_limit: Upper legs stay within plus and minus this angle in [rad].
+        stiffness_limit: Largest knee stiffness K in [N m/rad].
+    """
+
+    hip_mass: float = 45.0
+    upper_leg_mass: float = 11.25
+    lower_leg_mass: float = 3.75
+    upper_leg_length: float = 0.5
+    lower_leg_length: float = 0.5
+    gravity: float = 9.81
+    friction_coefficient: float = 0.8
+    hip_angle_limit: float = math.pi / 2
+    stiffness_limit: float = 2000.0
+
+    def __post_init__(self) -> None:
+        """Refuse values that no walker can have."""
+        for field in fields(self):
+            object.__setattr__(self, field.name, _positive(field.name, getattr(self, field.name)))
+        if self.hip_angle_limit > math.pi:
+            raise ConfigurationError(
+                f"walker parameter hip_angle_limit is {self.hip_angle_limit} rad, allowed is up to pi"
+            )
+
+    @classmethod
+    def from_yaml(cls, path: Path | None = None) -> "WalkerParameters":
+        """Read the parameters from a YAML file, by default the packaged `config/walker.yaml`.
+
+        Raises:
+            ConfigurationError: the file can't be read, or an entry is unknown or impossible.
+        """
+        source = path or config_file("walker.yaml")
+        entries = read_yaml(source)
+        known = {field.name for field in fields(cls)}
+        unknown = sorted(set(entries) - known)
+        if unknown:
+            raise ConfigurationError(
+                f"{source}: unknown walker parameter {', '.join(unknown)}; known are {', '.join(sorted(known))}"
+            )
+        return cls(**entries)
+
+    @property
+    def leg_length(self) -> float:
+        """Length of a stretched leg in [m]."""
+        return self.upper_leg_length + self.lower_leg_length
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of the whole walker in [kg]."""
+        return self.hip_mass + 2 * (self.upper_leg_mass + self.lower_leg_mass)
+
+    @property
+    def weight(self) -> float:
+        """Weight of the whole walker in [N]."""
+        return self.total_mass * self.gravity
+
+    def vector(self) -> list[float]:
+        """Return the values that the dynamics depend on, in the order of `SymbolicWalker.symbols`."""
+        return [getattr(self, name) for name in DYNAMIC_PARAMETERS]
+
+    def fingerprint(self) -> str:
+        """Return a short hash of all parameters: equal walkers have equal fingerprints."""
+        text = json.dumps(asdict(self), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _positive(name: str, value: Any) -> float:
+    """Return the value as a float.
+
+    Raises:
+        ConfigurationError: it is no finite positive number.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ConfigurationError(f"walker parameter {name} is {value!r}, expected a number")
+    if not (math.isfinite(value) and value > 0):
+        raise ConfigurationError(f"walker parameter {name} is {value}, allowed are finite numbers above 0")
+    return float(value)

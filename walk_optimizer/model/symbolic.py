@@ -1,0 +1,42 @@
+"""The walker's parameters as symbols, so that one compiled function serves every walker."""
+
+import casadi as ca
+
+from walk_optimizer.model.parameters import DYNAMIC_PARAMETERS
+
+
+class SymbolicWalker:
+    """The dynamic parameters of a walker as CasADi symbols, under the names of `WalkerParameters`.
+
+    Attributes:
+        symbols: All of them in one column, in the order of `WalkerParameters.vector`.
+    """
+
+    hip_mass: ca.SX
+    upper_leg_mass: ca.SX
+    lower_leg_mass: ca.SX
+    upper_leg_length: ca.SX
+    lower_leg_length: ca.SX
+    gravity: ca.SX
+    friction_coefficient: ca.SX
+
+    def __init__(self) -> None:
+        """Create the symbols."""
+        for name in DYNAMIC_PARAMETERS:
+            setattr(self, name, ca.SX.sym(name))
+        self.symbols: ca.SX = ca.vertcat(*(getattr(self, name) for name in DYNAMIC_PARAMETERS))
+
+    @property
+    def leg_length(self) -> ca.SX:
+        """Length of a stretched leg in [m]."""
+        return self.upper_leg_length + self.lower_leg_length
+
+    @property
+    def total_mass(self) -> ca.SX:
+        """Mass of the whole walker in [kg]."""
+        return self.hip_mass + 2 * (self.upper_leg_mass + self.lower_leg_mass)
+
+    @property
+    def weight(self) -> ca.SX:
+        """Weight of the whole walker in [N]."""
+        return self.total_mass * self.gravity

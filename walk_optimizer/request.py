@@ -1,0 +1,194 @@
+"""What a user asks for: a speed, a spring mode, a grid. Validated here, before any work."""
+
+import math
+import re
+from dataclasses import dataclass, fields
+from functools import cache
+from pathlib import Path
+
+from walk_optimizer.errors import ConfigurationError, InvalidRequestError
+from walk_optimizer.model.parameters import SpringMode
+from walk_optimizer.resources import config_file, read_yaml
+
+KMH_PER_MS = 3.6
+# The report prints km/h with two decimals: a speed within one unit of the last one names a table gait.
+TABLE_SPEED_TOLERANCE = 0.01 / KMH_PER_MS
+_BYTES_PER_POINT = 40_000
+
+
+@dataclass(frozen=True)
+class GaitTableSettings:
+    """The gaits of the table and the range of requests (config/gait_table.yaml).
+
+    Attributes:
+        slowest_step_length: In [m].
+        slowest_step_time: In [s].
+        fastest_step_length: In [m].
+        fastest_step_time: In [s].
+        gaits: Number of speeds in the table.
+        minimum_speed: Slowest speed that may be asked for in [m/s].
+        maximum_speed: Fastest speed that may be asked for in [m/s].
+        points: Default number N of grid points of a step.
+        minimum_points: Fewest grid points.
+        maximum_points: Most grid points.
+    """
+
+    slowest_step_length: float
+    slowest_step_time: float
+    fastest_step_length: float
+    fastest_step_time: float
+    gaits: int
+    minimum_speed: float
+    maximum_speed: float
+    points: int
+    minimum_points: int
+    maximum_points: int
+
+    @classmethod
+    def from_yaml(cls, path: Path | None = None) -> "GaitTableSettings":
+        """Read the settings, by default the packaged `config/gait_table.yaml`.
+
+        Raises:
+            ConfigurationError: an entry is missing, unknown or no positive number.
+        """
+        source = path or config_file("gait_table.yaml")
+        entries = read_yaml(source)
+        names = {field.name for field in fields(cls)}
+        if set(entries) != names:
+            wrong = ", ".join(sorted(set(entries) ^ names))
+            raise ConfigurationError(f"{source}: missing or unknown entries: {wrong}")
+        for name, value in entries.items():
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+                raise ConfigurationError(f"{source}: {name} is {value!r}, expected a positive number")
+        return cls(**entries)
+
+    def table_steps(self) -> list[tuple[float, float]]:
+        """Return (step length in [m], step time in [s]) of each gait of the table, slowest first."""
+        return [self._step(index / (self.gaits - 1)) for index in range(self.gaits)]
+
+    def table_speeds(self) -> list[float]:
+        """Return the speeds of the table in [m/s], slowest first."""
+        return [length / time for length, time in self.table_steps()]
+
+    def step_for_speed(self, speed: float) -> tuple[float, float]:
+        """Return step length in [m] and step time in [s] of a speed, on the line through the table's steps."""
+        length_span = self.fastest_step_length - self.slowest_step_length
+        time_span = self.fastest_step_time - self.slowest_step_time
+        # slowest_length + s length_span = speed (slowest_time + s time_span), solved for s.
+        place = (speed * self.slowest_step_time - self.slowest_step_length) / (length_span - speed * time_span)
+        return self._step(place)
+
+    def _step(self, place: float) -> tuple[float, float]:
+        length = self.slowest_step_length + place * (self.fastest_step_length - self.slowest_step_length)
+        time = self.slowest_step_time + place * (self.fastest_step_time - self.slowest_step_time)
+        return length, time
+
+
+@cache
+def gait_table_settings() -> GaitTableSettings:
+    """Return the packaged gait table settings, read once."""
+    return GaitTableSettings.from_yaml()
+
+
+@dataclass(frozen=True)
+class GaitRequest:
+    """A gait that is asked for; build it with `for_speed` or `for_step`, which validate.
+
+    Attributes:
+        step_length: Shortest step that counts, in [m].
+        step_time: Duration of a step in [s].
+        spring_mode: What may be chosen about the knee springs.
+        points: Number N of grid points of a step.
+    """
+
+    step_length: float
+    step_time: float
+    spring_mode: SpringMode
+    points: int
+
+    @property
+    def speed(self) -> float:
+        """Requested speed in [m/s]."""
+        return self.step_length / self.step_time
+
+    @property
+    def interval(self) -> float:
+        """Time step h in [s]."""
+        return self.step_time / self.points
+
+    @classmethod
+    def for_speed(
+        cls, speed: float, spring_mode: SpringMode | str = SpringMode.NONE, points: int | None = None
+    ) -> "GaitRequest":
+        """Return the request for a speed, with step length and time on the line of the table.
+
+        Args:
+            speed: In [m/s].
+            spring_mode: A mode or its name.
+            points: N; None means the default of the settings.
+
+        Raises:
+            InvalidRequestError: the speed, mode or number of points is impossible; the message says
+                what was got and what is allowed.
+        """
+        settings = gait_table_settings()
+        step_length, step_time = settings.step_for_speed(_checked_speed(speed, settings))
+        return cls(step_length, step_time, SpringMode.parse(spring_mode), _checked_points(points, settings))
+
+    @classmethod
+    def for_step(
+        cls,
+        step_length: float,
+        step_time: float,
+        spring_mode: SpringMode | str = SpringMode.NONE,
+        points: int | None = None,
+    ) -> "GaitRequest":
+        """Return the request for a step of given length in [m] and duration in [s].
+
+        Raises:
+            InvalidRequestError: as for `for_speed`.
+        """
+        settings = gait_table_settings()
+        for name, value in (("step length", step_length), ("step time", step_time)):
+            if not (math.isfinite(value) and value > 0):
+                raise InvalidRequestError(f"{name} is {value}, allowed are finite numbers above 0")
+        _checked_speed(step_length / step_time, settings)
+        return cls(step_length, step_time, SpringMode.parse(spring_mode), _checked_points(points, settings))
+
+
+def _checked_speed(speed: float, settings: GaitTableSettings) -> float:
+    """Return the speed; raise InvalidRequestError outside the settings' range."""
+    low, high = settings.minimum_speed, settings.maximum_speed
+    if not (math.isfinite(speed) and low <= speed <= high):
+        raise InvalidRequestError(
+            f"speed is {speed:g} m/s, allowed is {low:g} to {high:g} m/s "
+            f"({low * KMH_PER_MS:.2f} to {high * KMH_PER_MS:.2f} km/h)"
+        )
+    return float(speed)
+
+
+def _checked_points(points: int | None, settings: GaitTableSettings) -> int:
+    """Return the number of grid points; raise InvalidRequestError outside the settings' range."""
+    if points is None:
+        return settings.points
+    low, high = settings.minimum_points, settings.maximum_points
+    if isinstance(points, bool) or not isinstance(points, int) or not low <= points <= high:
+        estimate = f" (about {points * _BYTES_PER_POINT / 1e9:.1f} GB)" if isinstance(points, int) and points > high else ""
+        raise InvalidRequestError(f"N is {points!r} grid points{estimate}, allowed is {low} to {high}")
+    return points
+
+
+def parse_speed(text: str) -> float:
+    """Return the speed in [m/s] from a text such as `0.3185`, `0.3185m/s` or `1.15km/h`.
+
+    Raises:
+        InvalidRequestError: the text is no number, or has another unit.
+    """
+    match = re.fullmatch(r"\s*(\S+?)\s*(m/s|km/h)?\s*", text)
+    try:
+        value = float(match[1]) if match else math.nan
+    except ValueError:
+        match = None
+    if match is None:
+        raise InvalidRequestError(f"speed {text!r} not understood; write 0.3185, 0.3185m/s or 1.15km/h")
+    return value / KMH_PER_MS if match[2] == "km/h" else value

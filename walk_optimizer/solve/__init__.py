@@ -1,0 +1,1 @@
+"""Solvers: settings, status, back ends, worker process. Solves any nonlinear program, knows no walker."""

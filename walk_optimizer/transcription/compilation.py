@@ -1,0 +1,69 @@
+"""Compiles CasADi functions to machine code once, and keeps the result for the next process."""
+
+import hashlib
+import logging
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import casadi as ca
+
+_LOGGER = logging.getLogger(__name__)
+# -O2 takes half as long again to compile and runs no faster on this straight-line code.
+_COMPILER_FLAGS = ("-O1", "-fPIC", "-shared")
+COMPILER_VARIABLE = "WALK_OPTIMIZER_CC"
+
+
+def cache_folder() -> Path:
+    """Return the folder of compiled code: `$XDG_CACHE_HOME/walk_optimizer`, by default below `~/.cache`."""
+    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(root) / "walk_optimizer"
+
+
+@cache
+def compiled(build: Callable[[], list[ca.Function]]) -> dict[str, ca.Function]:
+    """Return the functions that `build` makes, by name, compiled where a C compiler is found.
+
+    Without a compiler (or with `WALK_OPTIMIZER_CC` set to an empty text) they run in CasADi's
+    interpreter: slower, with the same results.
+    """
+    functions = {function.name(): function for function in build()}
+    compiler = shutil.which(os.environ.get(COMPILER_VARIABLE, "cc") or "no-compiler")
+    if compiler is None:
+        return functions
+    try:
+        library = _shared_library(functions, compiler)
+    except (OSError, subprocess.CalledProcessError) as error:
+        _LOGGER.warning("C code can't be compiled (%s); CasADi's slower interpreter is used", error)
+        return functions
+    return {name: ca.external(name, str(library)) for name in functions}
+
+
+def _shared_library(functions: dict[str, ca.Function], compiler: str) -> Path:
+    """Return the shared library of the functions, compiling it unless it is in the cache."""
+    key = hashlib.sha256(" ".join([ca.__version__, platform.machine(), compiler, *_COMPILER_FLAGS]).encode())
+    for function in functions.values():
+        key.update(function.serialize().encode())
+    library = cache_folder() / f"{next(iter(functions))}-{key.hexdigest()[:24]}.so"
+    if not library.is_file():
+        library.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+            _compile(functions, compiler, Path(folder), library)
+    return library
+
+
+def _compile(functions: dict[str, ca.Function], compiler: str, folder: Path, library: Path) -> None:
+    """Generate C into a scratch folder, compile it, and move the result to its place in one step."""
+    generator = ca.CodeGenerator("stage.c")
+    for function in functions.values():
+        generator.add(function)
+    generator.generate(f"{folder}{os.sep}")
+    scratch = folder / "stage.so"
+    command = [compiler, *_COMPILER_FLAGS, str(folder / "stage.c"), "-o", str(scratch), "-lm"]
+    subprocess.run(command, check=True, capture_output=True)
+    scratch.replace(library)
