@@ -12,6 +12,8 @@ The wheels bring the whole of rclpy, but three things are left to do:
   by a start-up hook of the wheels themselves.
 """
 
+from __future__ import annotations  # lets a Python that is too old reach check_python
+
 import hashlib
 import os
 import re
