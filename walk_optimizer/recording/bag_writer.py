@@ -1,0 +1,249 @@
+"""A bag directory, while it is written: files, splits, metadata.yaml. One thread, no queue."""
+
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+
+from walk_optimizer.recording.disk import replace_text, write_error
+from walk_optimizer.recording.errors import (
+    BagExistsError,
+    BagNotWritableError,
+    MessageError,
+    RecordingError,
+    TopicError,
+)
+from walk_optimizer.recording.mcap_file import McapFile
+from walk_optimizer.recording.metadata import METADATA_FILE, BagMetadata, FileEntry, file_name
+from walk_optimizer.recording.settings import RecorderSettings
+from walk_optimizer.recording.topics import INFINITE_NS, NANOSECONDS_PER_SECOND, TopicInfo
+
+DEFAULT_ROS_DISTRO = "jazzy"
+"""Distribution named in bags where the environment does not say another one."""
+
+
+class BagWriter:
+    """Writes a rosbag2 directory with MCAP storage.
+
+    Every call may take as long as the disk does; `Recorder` is for those who cannot wait.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        settings: RecorderSettings | None = None,
+        custom_data: Mapping[str, str] | None = None,
+    ) -> None:
+        """Create the directory, its first file, and its metadata.yaml.
+
+        Args:
+            directory: Bag to create; missing parents are created too.
+            settings: How to write it.
+            custom_data: Free texts for metadata.yaml.
+
+        Raises:
+            BagExistsError: If the directory is already there.
+            BagNotWritableError: If it cannot be created.
+            DiskFullError: If there is no space for it.
+        """
+        self.directory = directory
+        self.settings = settings or RecorderSettings()
+        self.custom_data = dict(custom_data or {})
+        self._ros_distro = os.environ.get("ROS_DISTRO") or DEFAULT_ROS_DISTRO
+        self._topics: dict[str, TopicInfo] = {}
+        self._finished: list[FileEntry] = []
+        self._finished_bytes = 0
+        self._file: McapFile | None = None
+        _create_directory(directory)
+        try:
+            self._file = self._begin_file()
+            self._write_metadata()
+        except RecordingError:
+            # It was made just now, and a bag without files is none.
+            shutil.rmtree(directory, ignore_errors=True)
+            raise
+
+    def __enter__(self) -> "BagWriter":
+        """Return the writer."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the bag."""
+        self.close()
+
+    @property
+    def messages(self) -> int:
+        """Messages in the bag; the open chunk is in it, unless a failed write has lost that."""
+        return self._count(self._file.entry if self._file else None)
+
+    @property
+    def stored_messages(self) -> int:
+        """Messages that a crash of this process cannot take away."""
+        return self._count(self._file.stored if self._file else None)
+
+    @property
+    def size(self) -> int:
+        """Size of the files on the disk in [byte]; the open chunk is not in it."""
+        return self._finished_bytes + (self._file.size if self._file else 0)
+
+    @property
+    def topics(self) -> tuple[TopicInfo, ...]:
+        """Topics announced so far."""
+        return tuple(self._topics.values())
+
+    def add_topic(self, topic: TopicInfo) -> None:
+        """Announce a topic; announcing it again changes nothing.
+
+        Raises:
+            TopicError: If the topic is known with another type.
+            RecordingError: If the disk refuses.
+        """
+        known = self._topics.get(topic.name)
+        if known is not None:
+            require_same_type(known, topic)
+            return
+        self._open_file().add_topic(topic)
+        self._topics[topic.name] = topic
+        self._write_metadata()
+
+    def write(self, topic: str, data: bytes, log_time_ns: int, publish_time_ns: int | None = None) -> None:
+        """Append a message.
+
+        Args:
+            topic: Name of an announced topic.
+            data: The serialised message.
+            log_time_ns: When it was recorded, in [ns].
+            publish_time_ns: When it was published, in [ns]; `log_time_ns` when None.
+
+        Raises:
+            TopicError: If the topic was not announced.
+            MessageError: If data or time cannot be stored.
+            RecordingError: If the disk refuses.
+        """
+        require_message(self._topics, topic, data, log_time_ns)
+        if self._is_full(self._open_file(), log_time_ns):
+            self.split()
+        published_ns = log_time_ns if publish_time_ns is None else publish_time_ns
+        self._open_file().write(topic, data, log_time_ns, published_ns)
+
+    def flush(self) -> None:
+        """Bring what was written to the disk, the open chunk too if the settings say so."""
+        self._open_file().sync(self.settings.close_chunk_on_flush)
+
+    def split(self) -> None:
+        """End the current file and begin the next one."""
+        self._end_file(self._open_file())
+        self._file = self._begin_file()
+        self._write_metadata()
+
+    def close(self) -> None:
+        """End the bag; closing it again changes nothing.
+
+        After a failed write the file gets an end that readers accept, without the open chunk.
+
+        Raises:
+            RecordingError: If the disk refuses; what could be ended is ended nevertheless.
+        """
+        if self._file is None:
+            return
+        try:
+            self._end_file(self._file)
+        finally:
+            self._write_metadata()
+
+    def _open_file(self) -> McapFile:
+        if self._file is None:
+            raise BagNotWritableError(f"The bag {self.directory} is closed")
+        return self._file
+
+    def _begin_file(self) -> McapFile:
+        name = file_name(self.directory.name, len(self._finished))
+        file = McapFile(self.directory / name, self.settings)
+        # At the end of the file it stands again, with the counts; a killed recording has this one.
+        file.add_metadata(self._metadata(file.entry).to_record())
+        for topic in self.topics:
+            file.add_topic(topic)
+        return file
+
+    def _end_file(self, file: McapFile) -> None:
+        self._file = None
+        try:
+            file.finish(self._metadata(file.entry).to_record())
+        finally:
+            self._finished.append(file.entry)
+            self._finished_bytes += file.size
+
+    def _is_full(self, file: McapFile, log_time_ns: int) -> bool:
+        """Whether the next message belongs into a new file, by the rules of rosbag2."""
+        settings = self.settings
+        # A file holds a chunk at the least, however small the limit is.
+        if settings.max_file_bytes and file.size >= settings.max_file_bytes:
+            return file.stored.message_count > 0
+        if settings.max_file_duration and file.start_time_ns is not None:
+            span = settings.max_file_duration * NANOSECONDS_PER_SECOND
+            return log_time_ns - file.start_time_ns > span
+        return False
+
+    def _metadata(self, current: FileEntry | None) -> BagMetadata:
+        entries = [*self._finished, *([current] if current else [])]
+        return BagMetadata(self.topics, entries, self._ros_distro, self.custom_data)
+
+    def _write_metadata(self) -> None:
+        path = self.directory / METADATA_FILE
+        try:
+            replace_text(path, self._metadata(self._file.entry if self._file else None).to_file())
+        except OSError as error:
+            raise write_error(path, error) from error
+
+    def _count(self, current: FileEntry | None) -> int:
+        return sum(entry.message_count for entry in self._metadata(current).files)
+
+
+def require_same_type(known: TopicInfo, topic: TopicInfo) -> None:
+    """Refuse a topic that is known with another type.
+
+    Raises:
+        TopicError: With both types.
+    """
+    if (known.type_name, known.type_hash) != (topic.type_name, topic.type_hash):
+        raise TopicError(
+            f"Topic {topic.name} is {known.type_name} ({known.type_hash}) in this bag,"
+            f" not {topic.type_name} ({topic.type_hash})"
+        )
+
+
+def require_message(topics: Mapping[str, TopicInfo], topic: str, data: bytes, log_time_ns: int) -> None:
+    """Refuse what a bag cannot store.
+
+    Args:
+        topics: Announced topics by name.
+        topic: Name of the topic.
+        data: The serialised message.
+        log_time_ns: When it was recorded, in [ns].
+
+    Raises:
+        TopicError: If the topic was not announced.
+        MessageError: If data or time cannot be stored.
+    """
+    if topic not in topics:
+        known = ", ".join(sorted(topics)) or "none"
+        raise TopicError(f"Topic {topic} was not announced to the bag; it knows {known}")
+    if not isinstance(data, bytes):
+        raise MessageError(f"A message on {topic} is a {type(data).__name__}, must be bytes")
+    if not isinstance(log_time_ns, int) or not 0 <= log_time_ns <= INFINITE_NS:
+        raise MessageError(f"A log time on {topic} is {log_time_ns!r}, must be in [0, {INFINITE_NS}] ns")
+
+
+def _create_directory(directory: Path) -> None:
+    try:
+        directory.mkdir(parents=True)
+    except FileExistsError as error:
+        raise BagExistsError(f"{directory} exists already; a bag is never overwritten") from error
+    except OSError as error:
+        raise write_error(directory, error) from error

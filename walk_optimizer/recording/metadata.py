@@ -1,0 +1,153 @@
+"""The description of a bag: metadata.yaml of version 9, and the names of its files."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from walk_optimizer.recording.errors import NotABagError
+from walk_optimizer.recording.topics import INFINITE_NS, TopicInfo
+
+METADATA_FILE = "metadata.yaml"
+METADATA_VERSION = 9
+STORAGE_IDENTIFIER = "mcap"
+
+_TOP_LEVEL_KEY = "rosbag2_bagfile_information"
+
+
+@dataclass(frozen=True)
+class FileEntry:
+    """What the description says about one file of the bag.
+
+    Attributes:
+        path: Name of the file within the bag.
+        counts: Messages per topic.
+        start_time_ns: Earliest log time in [ns]; None without messages.
+        end_time_ns: Latest log time in [ns]; None without messages.
+    """
+
+    path: str
+    counts: Mapping[str, int] = field(default_factory=dict)
+    start_time_ns: int | None = None
+    end_time_ns: int | None = None
+
+    @property
+    def message_count(self) -> int:
+        """Messages in the file."""
+        return sum(self.counts.values())
+
+
+@dataclass(frozen=True)
+class BagMetadata:
+    """The description of a whole bag.
+
+    Attributes:
+        topics: Topics of the bag.
+        files: Files of the bag, in the order of recording.
+        ros_distro: Name of the ROS distribution that recorded it.
+        custom_data: Free texts.
+    """
+
+    topics: Sequence[TopicInfo]
+    files: Sequence[FileEntry]
+    ros_distro: str
+    custom_data: Mapping[str, str]
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the description as rosbag2 lays it out in YAML."""
+        return {
+            "version": METADATA_VERSION,
+            "storage_identifier": STORAGE_IDENTIFIER,
+            **_span(self.files),
+            "message_count": sum(entry.message_count for entry in self.files),
+            "topics_with_message_count": [self._topic(topic) for topic in self.topics],
+            # These two mean whole files that were compressed; chunks say it of themselves.
+            "compression_format": "",
+            "compression_mode": "",
+            "relative_file_paths": [entry.path for entry in self.files],
+            "files": [_file(entry) for entry in self.files],
+            "custom_data": dict(self.custom_data),
+            "ros_distro": self.ros_distro,
+        }
+
+    def to_record(self) -> str:
+        """Return the text that rosbag2 keeps inside of an MCAP file."""
+        return yaml.safe_dump(self.to_mapping(), sort_keys=False)
+
+    def to_file(self) -> str:
+        """Return the text of metadata.yaml."""
+        return yaml.safe_dump({_TOP_LEVEL_KEY: self.to_mapping()}, sort_keys=False)
+
+    def _topic(self, topic: TopicInfo) -> dict[str, Any]:
+        return {
+            "topic_metadata": {
+                "name": topic.name,
+                "type": topic.type_name,
+                "serialization_format": topic.serialization_format,
+                "offered_qos_profiles": [profile.to_mapping() for profile in topic.qos],
+                "type_description_hash": topic.type_hash,
+            },
+            "message_count": sum(entry.counts.get(topic.name, 0) for entry in self.files),
+        }
+
+
+def file_name(bag_name: str, number: int) -> str:
+    """Return the name of a file of a bag, counted from 0."""
+    return f"{bag_name}_{number}.mcap"
+
+
+def read_metadata(directory: Path) -> Mapping[str, Any]:
+    """Return the description of a bag directory; empty when it has none that can be read.
+
+    What is in the files counts, so a bag stays a bag without its metadata.yaml.
+    """
+    try:
+        content = yaml.safe_load((directory / METADATA_FILE).read_text(encoding="utf-8"))
+        description = content[_TOP_LEVEL_KEY]
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
+        return {}
+    return description if isinstance(description, Mapping) else {}
+
+
+def bag_files(path: Path) -> tuple[Path, ...]:
+    """Return the files of a bag in the order of recording.
+
+    Args:
+        path: A bag directory, or a single .mcap file.
+
+    Raises:
+        NotABagError: If there is nothing that could be a bag.
+    """
+    if not path.exists():
+        raise NotABagError(f"There is no {path}")
+    if not path.is_dir():
+        return (path,)
+    # Not the list in metadata.yaml: a killed recording may have begun a file that is not in it.
+    files = sorted(path.glob("*.mcap"), key=_recording_order)
+    if not files:
+        storage = read_metadata(path).get("storage_identifier", "unknown")
+        raise NotABagError(f"{path} holds no .mcap file (its storage is {storage!r}, not 'mcap')")
+    return tuple(files)
+
+
+def _recording_order(path: Path) -> tuple[int, str]:
+    number = re.search(r"_(\d+)$", path.stem)
+    return (int(number.group(1)) if number else 0, path.name)
+
+
+def _span(entries: Sequence[FileEntry]) -> dict[str, Any]:
+    """Return start and duration of files; without messages rosbag2 writes the largest time."""
+    starts = [entry.start_time_ns for entry in entries if entry.start_time_ns is not None]
+    ends = [entry.end_time_ns for entry in entries if entry.end_time_ns is not None]
+    start = min(starts, default=INFINITE_NS)
+    return {
+        "duration": {"nanoseconds": max(ends, default=start) - start},
+        "starting_time": {"nanoseconds_since_epoch": start},
+    }
+
+
+def _file(entry: FileEntry) -> dict[str, Any]:
+    return {"path": entry.path, **_span([entry]), "message_count": entry.message_count}
