@@ -98,6 +98,7 @@ class Gait:
         trajectory: States, torques and contact of one step.
         report: How it was solved.
         certificate: Its residuals, computed apart from the solver.
+        step_length: Length of the step in [m]; at least the requested one.
     """
 
     walker: WalkerParameters

@@ -13,25 +13,9 @@ from numpy.typing import NDArray
 from walk_optimizer.transcription import layout
 from walk_optimizer.transcription.compilation import compiled
 from walk_optimizer.transcription.euler_stage import boundary_functions, stage_functions
+from walk_optimizer.transcription.program import Nlp
 
 _PARAMETERS = 8
-
-
-@dataclass(frozen=True)
-class Nlp:
-    """A nonlinear program min f(x, p) with rows g(x, p), with exact sparse derivatives.
-
-    Attributes:
-        expressions: x, p, f and g for `casadi.nlpsol`.
-        jacobian: (x, p) -> (g, dg/dx).
-        hessian: (x, p, lam_f, lam_g) -> upper triangle of the Hessian of the Lagrangian.
-        gradient: (x, p) -> (f, df/dx).
-    """
-
-    expressions: dict[str, ca.MX]
-    jacobian: ca.Function
-    hessian: ca.Function
-    gradient: ca.Function
 
 
 @dataclass(frozen=True)

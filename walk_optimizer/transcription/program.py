@@ -1,0 +1,52 @@
+"""A nonlinear program and its numbers."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Nlp:
+    """A nonlinear program min f(x, p) with rows g(x, p), with exact sparse derivatives.
+
+    Attributes:
+        expressions: x, p, f and g for `casadi.nlpsol`.
+        jacobian: (x, p) -> (g, dg/dx).
+        hessian: (x, p, lam_f, lam_g) -> upper triangle of the Hessian of the Lagrangian.
+        gradient: (x, p) -> (f, df/dx).
+    """
+
+    expressions: dict[str, ca.MX]
+    jacobian: ca.Function
+    hessian: ca.Function
+    gradient: ca.Function
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A nonlinear program with its parameters and bounds; all values are scaled.
+
+    Attributes:
+        nlp: Functions and derivatives.
+        parameters: p.
+        lower_x: Lower bounds of x.
+        upper_x: Upper bounds of x.
+        lower_g: Lower bounds of g.
+        upper_g: Upper bounds of g.
+    """
+
+    nlp: Nlp
+    parameters: FloatArray
+    lower_x: FloatArray
+    upper_x: FloatArray
+    lower_g: FloatArray
+    upper_g: FloatArray
+
+    def infeasibility(self, x: FloatArray, g: FloatArray) -> float:
+        """Return the largest violation of any bound at x with rows g."""
+        gaps = (self.lower_x - x, x - self.upper_x, self.lower_g - g, g - self.upper_g)
+        return max(0.0, *(float(gap.max()) for gap in gaps))
