@@ -22,7 +22,7 @@ def walker_node(name: str) -> Node:
             PathJoinSubstitution([FindPackageShare("walk_optimizer"), "config", f"{name}.yaml"]),
             {"use_sim_time": use_sim_time},
         ],
-        arguments=["--ros-args", "--log-level", LaunchConfiguration("log_level")],
+        ros_arguments=["--log-level", LaunchConfiguration("log_level")],
         output="screen",
     )
 
