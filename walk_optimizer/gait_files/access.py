@@ -1,0 +1,94 @@
+"""Careful reading and writing of small files: no links, no devices, no half-written file."""
+
+import contextlib
+import os
+import stat
+import tempfile
+from pathlib import Path
+
+from walk_optimizer.errors import GaitFileError
+
+
+def read_limited(path: Path, largest: int) -> bytes:
+    """Return the content of a regular file.
+
+    Args:
+        path: The file; a symbolic link is refused.
+        largest: Most bytes that it may have.
+
+    Raises:
+        GaitFileError: the file is missing, no regular file, or too large.
+    """
+    try:
+        # Without O_NONBLOCK a named pipe would wait for a writer forever.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+        with os.fdopen(descriptor, "rb") as stream:
+            status = os.fstat(stream.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise GaitFileError(f"{path}: no regular file")
+            if status.st_size > largest:
+                raise GaitFileError(f"{path}: {status.st_size} bytes, a gait file has at most {largest}")
+            return stream.read(largest)
+    except OSError as error:
+        if path.is_symlink():
+            raise GaitFileError(f"{path}: a symbolic link, which is not followed") from error
+        raise GaitFileError(f"{path}: can't be read: {error.strerror}") from error
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Give a file a new content such that a crash leaves either the old or the new one.
+
+    Raises:
+        GaitFileError: the file can't be written; a former one is as before.
+    """
+    draft = None
+    try:
+        descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".new", dir=path.parent)
+        draft = Path(name)
+        with os.fdopen(descriptor, "wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fchmod(stream.fileno(), 0o644)
+            os.fsync(stream.fileno())
+        draft.replace(path)
+        _sync_folder(path.parent)
+    except OSError as error:
+        raise GaitFileError(f"{path}: can't be written: {error.strerror}") from error
+    finally:
+        # Also on Ctrl-C: only a killed process leaves its draft, which no reader takes for a gait.
+        if draft is not None:
+            with contextlib.suppress(OSError):
+                draft.unlink(missing_ok=True)
+
+
+def writable_folder(folder: Path, create: bool) -> None:
+    """Make sure that files can be written into a folder.
+
+    Args:
+        folder: The folder; a symbolic link is refused, so that no other place is written to.
+        create: Whether to create it when it is missing.
+
+    Raises:
+        GaitFileError: the folder is missing, a link, no folder, or not writable; the message names it.
+    """
+    if folder.is_symlink():
+        raise GaitFileError(f"{folder}: the gait folder is a symbolic link, which is not written through")
+    try:
+        if create:
+            folder.mkdir(parents=True, exist_ok=True)
+        if not folder.is_dir():
+            raise GaitFileError(f"{folder}: the gait folder is missing; create it or name another")
+        # Permissions alone do not tell: the file system may be read-only, or full.
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise GaitFileError(f"{folder}: the gait folder is not writable: {error.strerror}") from error
+
+
+def _sync_folder(folder: Path) -> None:
+    """Wait until the disk knows the names in a folder."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

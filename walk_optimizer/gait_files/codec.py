@@ -1,0 +1,191 @@
+"""The bytes of a gait file: a gait to bytes, and back after every check (docs/gait_format.md)."""
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer import __version__
+from walk_optimizer.errors import GaitFileError, InvalidRequestError
+from walk_optimizer.gait import Certificate, FloatArray, Gait, Trajectory
+from walk_optimizer.gait_files.archive import read_archive
+from walk_optimizer.gait_files.header import from_plain, to_plain
+from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.request import GaitRequest
+from walk_optimizer.solve.status import SolveReport
+
+FORMAT = "walk_optimizer.gait"
+VERSION = 1
+# 2000 points take 0.4 MB; a file above this is no gait, whatever its header says.
+LARGEST_FILE = 16 * 1024 * 1024
+REFINED_PREFIX = "refined_"
+_HEADER = "header"
+_HEADER_ENTRIES = {"format", "version", "software", "checksum", "walker", "request", "spring"} | {
+    "report",
+    "certificate",
+    "step_length",
+    "refined",
+}
+_ROWS = {"q": 6, "p": 6, "u": 3, "reaction": 6, "slip_speed": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class GaitFile:
+    """What a gait file holds.
+
+    Attributes:
+        gait: The gait on the report's grid.
+        refined: Arrays of a second, more accurate representation, by name without prefix; empty
+            when there is none.
+        refined_header: What describes them, plain JSON values.
+    """
+
+    gait: Gait
+    refined: Mapping[str, FloatArray] = field(default_factory=dict)
+    refined_header: Mapping[str, Any] = field(default_factory=dict)
+
+
+def encode(content: GaitFile) -> bytes:
+    """Return the bytes of a gait file; equal gaits give equal bytes."""
+    gait = content.gait
+    arrays = {name: getattr(gait.trajectory, name) for name in _trajectory_names()}
+    arrays |= {REFINED_PREFIX + name: values for name, values in content.refined.items()}
+    for name, values in arrays.items():
+        _check_finite(name, values)
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "software": __version__,
+        "walker": to_plain(gait.walker),
+        "request": to_plain(gait.request),
+        "spring": to_plain(gait.spring),
+        "report": to_plain(gait.report),
+        "certificate": to_plain(gait.certificate),
+        "step_length": gait.step_length,
+        "refined": to_plain(dict(content.refined_header)),
+    }
+    header["checksum"] = _checksum(header, arrays)
+    text = json.dumps(header, indent=1, sort_keys=True, allow_nan=False)
+    buffer = io.BytesIO()
+    np.savez(buffer, allow_pickle=False, **{_HEADER: np.frombuffer(text.encode(), np.uint8)}, **arrays)
+    return buffer.getvalue()
+
+
+def decode(data: bytes) -> GaitFile:
+    """Return what the bytes of a gait file hold.
+
+    Raises:
+        GaitFileError: the bytes are no whole gait file of this version.
+    """
+    arrays = read_archive(data, LARGEST_FILE)
+    header = _header(arrays.pop(_HEADER, None))
+    if header["checksum"] != _checksum(header, arrays):
+        raise GaitFileError("damaged: the checksum does not fit the content")
+    return GaitFile(
+        gait=_gait(header, arrays),
+        refined={
+            name.removeprefix(REFINED_PREFIX): values
+            for name, values in arrays.items()
+            if name.startswith(REFINED_PREFIX)
+        },
+        refined_header=header["refined"],
+    )
+
+
+def _trajectory_names() -> tuple[str, ...]:
+    """Return the names of the arrays of the report's grid."""
+    return tuple(entry.name for entry in fields(Trajectory))
+
+
+def _checksum(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the SHA-256 of the header without its checksum and of all arrays."""
+    rest = {key: value for key, value in header.items() if key != "checksum"}
+    digest = hashlib.sha256(json.dumps(rest, sort_keys=True).encode())
+    for name in sorted(arrays):
+        digest.update(f"{name}{arrays[name].shape}".encode())
+        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
+    return digest.hexdigest()
+
+
+def _header(values: NDArray[Any] | None) -> dict[str, Any]:
+    """Return the checked header of this version."""
+    if values is None or values.dtype != np.uint8:
+        raise GaitFileError("not a gait file: it has no header")
+    try:
+        header = json.loads(values.tobytes().decode())
+    except (ValueError, RecursionError) as error:
+        raise GaitFileError(f"damaged: the header is no JSON ({error})") from error
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise GaitFileError(f"not a gait file: the header does not name the format {FORMAT}")
+    if header.get("version") != VERSION:
+        raise GaitFileError(f"format version is {header.get('version')!r}, this program reads {VERSION}")
+    wrong = sorted(set(header) ^ _HEADER_ENTRIES)
+    if wrong:
+        raise GaitFileError(f"header has missing or unknown entries: {', '.join(wrong)}")
+    if not isinstance(header["refined"], dict):
+        raise GaitFileError("header entry refined is no mapping")
+    return header
+
+
+def _gait(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Gait:
+    """Return the gait of a header and its arrays."""
+    request = _request(header)
+    return Gait(
+        walker=from_plain(WalkerParameters, header["walker"], "walker"),
+        request=request,
+        spring=from_plain(KneeSpring, header["spring"], "spring"),
+        trajectory=_trajectory(arrays, request.points),
+        report=from_plain(SolveReport, header["report"], "report"),
+        certificate=from_plain(Certificate, header["certificate"], "certificate"),
+        step_length=_positive(header["step_length"], "step_length"),
+    )
+
+
+def _request(header: Mapping[str, Any]) -> GaitRequest:
+    """Return the request, validated as any user's."""
+    request = from_plain(GaitRequest, header["request"], "request")
+    try:
+        return GaitRequest.for_step(
+            request.step_length, request.step_time, request.spring_mode, request.points
+        )
+    except InvalidRequestError as error:
+        raise GaitFileError(f"request: {error}") from error
+
+
+def _trajectory(arrays: Mapping[str, NDArray[Any]], points: int) -> Trajectory:
+    """Return the trajectory after a check of names, types, shapes and values."""
+    names = _trajectory_names()
+    plain = {name for name in arrays if not name.startswith(REFINED_PREFIX)}
+    wrong = sorted(plain ^ set(names))
+    if wrong:
+        raise GaitFileError(f"missing or unknown arrays: {', '.join(wrong)}")
+    for name, values in arrays.items():
+        _check_finite(name, values)
+    for name in names:
+        shape = (points,) if name == "time" else (_ROWS[name], points)
+        if arrays[name].shape != shape:
+            raise GaitFileError(f"array {name} has the shape {arrays[name].shape}, expected {shape}")
+    if np.any(np.diff(arrays["time"], prepend=0.0) <= 0):
+        raise GaitFileError("array time does not increase from above 0")
+    return Trajectory(**{name: arrays[name] for name in names})
+
+
+def _check_finite(name: str, values: NDArray[Any]) -> None:
+    """Raise GaitFileError unless all values are finite double precision numbers."""
+    if values.dtype != np.float64:
+        raise GaitFileError(f"array {name} holds {values.dtype}, expected float64")
+    if not np.isfinite(values).all():
+        count = int(np.sum(~np.isfinite(values)))
+        raise GaitFileError(f"array {name} has {count} values that are not finite")
+
+
+def _positive(value: Any, where: str) -> float:
+    """Return a finite number above 0."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < np.inf:
+        raise GaitFileError(f"{where} is {value!r}, expected a finite number above 0")
+    return float(value)

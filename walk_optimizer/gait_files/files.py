@@ -1,0 +1,66 @@
+"""Gait files on disk: their names, atomic writing, reading for one walker."""
+
+from dataclasses import fields
+from pathlib import Path
+
+from walk_optimizer.errors import GaitFileError
+from walk_optimizer.gait import Gait
+from walk_optimizer.gait_files.access import read_limited, replace_file
+from walk_optimizer.gait_files.codec import LARGEST_FILE, GaitFile, decode, encode
+from walk_optimizer.model.parameters import WalkerParameters
+
+SUFFIX = ".npz"
+
+
+def gait_file_name(gait: Gait) -> str:
+    """Return the file name of a gait: the same request for the same walker has the same name."""
+    request = gait.request
+    return (
+        f"{request.spring_mode.value}_{request.step_length:.4f}m_{request.step_time:.4f}s"
+        f"_n{request.points}_{gait.walker.fingerprint()[:8]}{SUFFIX}"
+    )
+
+
+def write_gait_file(content: GaitFile, path: Path) -> None:
+    """Write a gait file; a crash leaves either the former file or the whole new one.
+
+    Raises:
+        GaitFileError: the file can't be written, or a number is not finite.
+    """
+    try:
+        data = encode(content)
+    except GaitFileError as error:
+        raise GaitFileError(f"{path}: {error}") from error
+    replace_file(path, data)
+
+
+def read_gait_file(path: Path, walker: WalkerParameters | None = None) -> GaitFile:
+    """Read a gait file and check all of it.
+
+    Args:
+        path: The file.
+        walker: The walker that it must be for; None takes any.
+
+    Raises:
+        GaitFileError: the file is missing, damaged, of another version or for another walker; the
+            message begins with the path.
+    """
+    data = read_limited(path, LARGEST_FILE)
+    try:
+        content = decode(data)
+        _check_walker(content.gait.walker, walker)
+    except GaitFileError as error:
+        raise GaitFileError(f"{path}: {error}") from error
+    return content
+
+
+def _check_walker(found: WalkerParameters, expected: WalkerParameters | None) -> None:
+    """Raise GaitFileError that names the parameters in which two walkers differ."""
+    if expected is None or found == expected:
+        return
+    differences = [
+        f"{entry.name} is {getattr(found, entry.name)}, expected {getattr(expected, entry.name)}"
+        for entry in fields(WalkerParameters)
+        if getattr(found, entry.name) != getattr(expected, entry.name)
+    ]
+    raise GaitFileError(f"for another walker: {'; '.join(differences)}")
