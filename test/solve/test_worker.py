@@ -1,0 +1,224 @@
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from solve.worker_jobs import work
+
+from walk_optimizer.errors import SolveFailedError
+from walk_optimizer.solve.status import Status
+from walk_optimizer.solve.worker import BusyError, SolveStoppedError, WorkerPool
+
+PATIENCE = 120.0
+FOREVER = 1e6
+
+
+@pytest.fixture
+def pool():
+    pool = WorkerPool(work, workers=1, queue_limit=2)
+    yield pool
+    pool.close()
+
+
+class FirstProgress:
+    """Keeps the first progress event of a job."""
+
+    def __init__(self):
+        self._event, self._came = None, threading.Event()
+
+    def __call__(self, event):
+        self._event = self._event or event
+        self._came.set()
+
+    def wait(self):
+        assert self._came.wait(PATIENCE)
+        return self._event
+
+
+def exists(pid):
+    """Whether a process runs; a dead one that nobody has waited for does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_until_gone(pid):
+    deadline = time.monotonic() + PATIENCE
+    while exists(pid):
+        assert time.monotonic() < deadline, f"process {pid} still runs"
+        time.sleep(0.01)
+
+
+def status_of(ticket):
+    error = ticket.future.exception(PATIENCE)
+    assert isinstance(error, SolveStoppedError), error
+    return error.report.status
+
+
+def test_a_job_is_answered_by_another_process_that_stays(pool):
+    first = pool.submit("pid", FOREVER).future.result(PATIENCE)
+    assert first != os.getpid()
+    assert pool.submit("echo a b", FOREVER).future.result(PATIENCE) == "a b"
+    assert pool.submit("pid", FOREVER).future.result(PATIENCE) == first
+
+
+def test_cancel_answers_at_once_and_ends_the_process(pool):
+    progress = FirstProgress()
+    ticket = pool.submit("sleep", FOREVER, progress)
+    worker = progress.wait().iteration
+    ticket.cancel()
+    assert ticket.future.done()  # Nobody has to wait for the process to end.
+    assert status_of(ticket) is Status.CANCELLED
+    wait_until_gone(worker)
+    assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
+
+
+def test_a_cancelled_report_keeps_the_last_iterate(pool):
+    progress = FirstProgress()
+    ticket = pool.submit("sleep", FOREVER, progress)
+    event = progress.wait()
+    ticket.cancel()
+    report = ticket.future.exception().report
+    assert (report.iterations, report.objective) == (event.iteration, 1.5)
+    assert report.message == Status.CANCELLED.sentence
+
+
+def test_what_the_job_has_started_is_killed_too(pool):
+    progress = FirstProgress()
+    ticket = pool.submit("child", FOREVER, progress)
+    grandchild = progress.wait().iteration
+    ticket.cancel()
+    wait_until_gone(grandchild)
+
+
+def test_a_killed_worker_is_told_and_replaced(pool):
+    progress = FirstProgress()
+    ticket = pool.submit("sleep", FOREVER, progress)
+    os.kill(progress.wait().iteration, signal.SIGKILL)
+    assert status_of(ticket) is Status.WORKER_LOST
+    assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
+
+
+def test_a_worker_that_died_idle_is_replaced_unnoticed(pool):
+    worker = pool.submit("pid", FOREVER).future.result(PATIENCE)
+    os.kill(worker, signal.SIGKILL)
+    wait_until_gone(worker)
+    assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
+
+
+def test_a_worker_that_exits_by_itself_is_lost(pool):
+    assert status_of(pool.submit("die", FOREVER)) is Status.WORKER_LOST
+
+
+def test_time_limit_is_enforced_from_outside():
+    pool = WorkerPool(work, grace=0.1)
+    try:
+        progress = FirstProgress()
+        ticket = pool.submit("sleep", 0.3, progress)
+        assert status_of(ticket) is Status.TIME_LIMIT
+        wait_until_gone(progress.wait().iteration)
+        assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
+    finally:
+        pool.close()
+
+
+def test_two_clients_share_one_solve(pool):
+    progress, other = FirstProgress(), FirstProgress()
+    first = pool.submit("sleep", FOREVER, progress)
+    worker = progress.wait().iteration
+    second = pool.submit("sleep", FOREVER, other)
+    assert other.wait().iteration == worker
+    first.cancel()
+    assert status_of(first) is Status.CANCELLED
+    assert exists(worker)
+    assert not second.future.done()
+    second.cancel()
+    wait_until_gone(worker)
+
+
+def test_a_full_queue_is_busy_and_frees_up(pool):
+    running = FirstProgress()
+    tickets = [pool.submit("sleep", FOREVER, running)]
+    running.wait()
+    tickets += [pool.submit(f"echo {number}", FOREVER) for number in range(2)]
+    with pytest.raises(BusyError, match="busy: 2 solves are waiting, no more than 2 may"):
+        pool.submit("echo 2", FOREVER)
+    assert pool.submit("echo 1", FOREVER).future is not tickets[2].future  # The same job needs no place.
+    tickets[1].cancel()
+    assert status_of(tickets[1]) is Status.CANCELLED
+    last = pool.submit("echo 2", FOREVER)
+    tickets[0].cancel()
+    assert last.future.result(PATIENCE) == "2"
+
+
+def test_a_flood_is_answered_to_the_last_request(pool):
+    def answer(number):
+        try:
+            return pool.submit(f"echo {number % 5}", FOREVER).future
+        except BusyError as error:
+            return error
+
+    answers = [answer(number) for number in range(1000)]
+    assert all(isinstance(one, BusyError) or one.result(PATIENCE) in set("01234") for one in answers)
+
+
+@pytest.mark.parametrize(("words", "message"), [("known", "refused"), ("unknown", "unexpectedly.*surprise")])
+def test_an_exception_is_an_answer(pool, words, message):
+    error = pool.submit(f"raise {words}", FOREVER).future.exception(PATIENCE)
+    assert isinstance(error, SolveFailedError)
+    with pytest.raises(SolveFailedError, match=message):
+        raise error
+    assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
+
+
+def test_close_ends_everything(pool):
+    progress = FirstProgress()
+    running = pool.submit("sleep", FOREVER, progress)
+    waiting = pool.submit("echo", FOREVER)
+    worker = progress.wait().iteration
+    pool.close()
+    assert not exists(worker)
+    assert status_of(running) is status_of(waiting) is Status.CANCELLED
+    assert not any(thread.name.startswith("solve_worker") for thread in threading.enumerate())
+    with pytest.raises(BusyError, match="shutting down"):
+        pool.submit("echo", FOREVER)
+
+
+PARENT = """
+import sys, time
+from solve.worker_jobs import work
+from walk_optimizer.solve.worker import WorkerPool
+if __name__ == "__main__":
+    pool = WorkerPool(work)
+    pool.submit("sleep", 1e6, lambda event: print(event.iteration, flush=True))
+    time.sleep(0 if sys.argv[1] == "return" else 600)
+    if sys.argv[1] == "return":
+        sys.stdin.readline()
+"""
+
+
+@pytest.mark.parametrize("end", ["return", "killed"])
+def test_no_worker_outlives_its_parent(tmp_path, end):
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)}
+    pipe = subprocess.PIPE
+    command = [sys.executable, script, end]
+    parent = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment)
+    worker = int(parent.stdout.readline())
+    if end == "killed":
+        parent.kill()
+    parent.stdin.close()
+    parent.stdout.close()
+    assert parent.wait(PATIENCE) == (-signal.SIGKILL if end == "killed" else 0)
+    wait_until_gone(worker)
+
+
+def test_unknown_objective_is_nan(pool):
+    assert math.isnan(pool.submit("die", FOREVER).future.exception(PATIENCE).report.objective)

@@ -1,0 +1,139 @@
+"""One step of a gait as a function of time: coordinates, velocities and torques between grid points."""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.gait import Gait, Trajectory, read_only
+from walk_optimizer.model.kinematics import HIP_X, RELABELLED
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class StepSample:
+    """The walker at one instant of a step; leg 1 is the stance leg.
+
+    Attributes:
+        q: Coordinates in [m] and [rad], (6,).
+        qdot: Their velocities in [m/s] and [rad/s], (6,).
+        u: Hip torque and knee torques of leg 1 and leg 2 in [N m], (3,).
+    """
+
+    q: FloatArray
+    qdot: FloatArray
+    u: FloatArray
+
+
+class StepProfile(Protocol):
+    """A step that can be sampled at any time; q is continuous, and qdot is its derivative."""
+
+    @property
+    def step_time(self) -> float:
+        """Duration of the step in [s]."""
+
+    @property
+    def step_length(self) -> float:
+        """Distance that the step covers in [m]."""
+
+    def sample(self, time: float) -> StepSample:
+        """Return the walker at a time in [s] from the start of the step, 0 <= time <= step_time."""
+
+
+def relabelled(q: FloatArray, step_length: float) -> FloatArray:
+    """Return coordinates (6,) as the next step sees them: legs exchanged, origin one step further."""
+    exchanged = q[list(RELABELLED)]
+    exchanged[HIP_X] -= step_length
+    return exchanged
+
+
+class EulerProfile:
+    """The interpolation that belongs to the report's grid (report section III, implicit Euler).
+
+    Implicit Euler says q_i - q_(i-1) = h qdot_i, with the torque u_i acting on the whole interval. So
+    on (t_(i-1), t_i] the velocity is (q_i - q_(i-1)) / h, the torque is u_i, and q is linear. The state
+    before point 1 is point N relabelled.
+    """
+
+    def __init__(self, trajectory: Trajectory, step_length: float, step_time: float) -> None:
+        """Tabulate the intervals.
+
+        Args:
+            trajectory: States and torques on an even grid.
+            step_length: In [m].
+            step_time: In [s].
+        """
+        self._step_time, self._step_length = step_time, step_length
+        self._count = trajectory.points
+        self._interval = step_time / trajectory.points
+        before = relabelled(trajectory.q[:, -1], step_length)
+        ends = np.column_stack([before, trajectory.q])
+        # One row an interval, so that a sample is a few views and one sum.
+        self._starts = read_only(ends[:, :-1].T)
+        self._velocities = read_only(np.diff(ends, axis=1).T / self._interval)
+        self._torques = read_only(trajectory.u.T)
+
+    @classmethod
+    def of(cls, gait: Gait) -> "EulerProfile":
+        """Return the profile of a gait."""
+        return cls(gait.trajectory, gait.step_length, gait.request.step_time)
+
+    @property
+    def step_time(self) -> float:
+        """Duration of the step in [s]."""
+        return self._step_time
+
+    @property
+    def step_length(self) -> float:
+        """Distance that the step covers in [m]."""
+        return self._step_length
+
+    def sample(self, time: float) -> StepSample:
+        """Return the walker at a time in [s] from the start of the step, 0 <= time <= step_time."""
+        index = min(max(math.ceil(time / self._interval) - 1, 0), self._count - 1)
+        qdot = self._velocities[index]
+        q = self._starts[index] + (time - index * self._interval) * qdot
+        q.setflags(write=False)
+        return StepSample(q, qdot, self._torques[index])
+
+
+class BlendedProfile:
+    """The first step of a new gait, begun at the coordinates where the former gait ended.
+
+    The difference at the start fades over the step with s(t) = 1 - 10 t^3 + 15 t^4 - 6 t^5 (t from 0 to
+    1), whose first and second derivatives vanish at both ends. So the references never jump. It is a
+    smooth change of references, not an optimised step: its torques are those of the new gait.
+    """
+
+    def __init__(self, profile: StepProfile, start: FloatArray) -> None:
+        """Blend.
+
+        Args:
+            profile: The new gait.
+            start: Coordinates where the step begins, as the new step sees them, (6,).
+        """
+        self._profile = profile
+        self._difference = start - profile.sample(0.0).q
+
+    @property
+    def step_time(self) -> float:
+        """Duration of the step in [s]."""
+        return self._profile.step_time
+
+    @property
+    def step_length(self) -> float:
+        """Distance that the step covers in [m]."""
+        return self._profile.step_length
+
+    def sample(self, time: float) -> StepSample:
+        """Return the walker at a time in [s] from the start of the step, 0 <= time <= step_time."""
+        target = self._profile.sample(time)
+        s = time / self.step_time
+        fading = 1 - s**3 * (10 - 15 * s + 6 * s**2)
+        rate = -30 * (s * (1 - s)) ** 2 / self.step_time
+        return StepSample(
+            target.q + fading * self._difference, target.qdot + rate * self._difference, target.u
+        )
