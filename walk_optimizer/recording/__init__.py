@@ -7,9 +7,10 @@ from this page.
 from walk_optimizer.recording.bag_writer import BagWriter
 from walk_optimizer.recording.info import BagInfo, describe_bag, format_bag
 from walk_optimizer.recording.reading import BagMessage, read_messages
-from walk_optimizer.recording.recorder import Recorder, RecorderStatus
+from walk_optimizer.recording.recorder import Recorder
 from walk_optimizer.recording.repair import RepairReport, repair_bag
 from walk_optimizer.recording.settings import Compression, RecorderSettings
+from walk_optimizer.recording.status import RecorderStatus
 from walk_optimizer.recording.topics import QosProfile, TopicInfo
 
 __all__ = [

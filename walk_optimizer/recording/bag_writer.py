@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 
@@ -10,14 +10,17 @@ from walk_optimizer.recording.disk import replace_text, write_error
 from walk_optimizer.recording.errors import (
     BagExistsError,
     BagNotWritableError,
-    MessageError,
     RecordingError,
-    TopicError,
 )
 from walk_optimizer.recording.mcap_file import McapFile
 from walk_optimizer.recording.metadata import METADATA_FILE, BagMetadata, FileEntry, file_name
 from walk_optimizer.recording.settings import RecorderSettings
-from walk_optimizer.recording.topics import INFINITE_NS, NANOSECONDS_PER_SECOND, TopicInfo
+from walk_optimizer.recording.topics import (
+    NANOSECONDS_PER_SECOND,
+    TopicInfo,
+    require_message,
+    require_same_type,
+)
 
 DEFAULT_ROS_DISTRO = "jazzy"
 """Distribution named in bags where the environment does not say another one."""
@@ -34,6 +37,7 @@ class BagWriter:
         directory: Path,
         settings: RecorderSettings | None = None,
         custom_data: Mapping[str, str] | None = None,
+        topics: Iterable[TopicInfo] = (),
     ) -> None:
         """Create the directory, its first file, and its metadata.yaml.
 
@@ -41,6 +45,7 @@ class BagWriter:
             directory: Bag to create; missing parents are created too.
             settings: How to write it.
             custom_data: Free texts for metadata.yaml.
+            topics: Topics to announce from the start; others may follow.
 
         Raises:
             BagExistsError: If the directory is already there.
@@ -51,7 +56,7 @@ class BagWriter:
         self.settings = settings or RecorderSettings()
         self.custom_data = dict(custom_data or {})
         self._ros_distro = os.environ.get("ROS_DISTRO") or DEFAULT_ROS_DISTRO
-        self._topics: dict[str, TopicInfo] = {}
+        self._topics = {topic.name: topic for topic in topics}
         self._finished: list[FileEntry] = []
         self._finished_bytes = 0
         self._file: McapFile | None = None
@@ -60,6 +65,8 @@ class BagWriter:
             self._file = self._begin_file()
             self._write_metadata()
         except RecordingError:
+            if self._file is not None:
+                self._file.discard()
             # It was made just now, and a bag without files is none.
             shutil.rmtree(directory, ignore_errors=True)
             raise
@@ -165,10 +172,14 @@ class BagWriter:
     def _begin_file(self) -> McapFile:
         name = file_name(self.directory.name, len(self._finished))
         file = McapFile(self.directory / name, self.settings)
-        # At the end of the file it stands again, with the counts; a killed recording has this one.
-        file.add_metadata(self._metadata(file.entry).to_record())
-        for topic in self.topics:
-            file.add_topic(topic)
+        try:
+            # It stands again at the end, with the counts; a killed recording has only this one.
+            file.add_metadata(self._metadata(file.entry).to_record())
+            for topic in self.topics:
+                file.add_topic(topic)
+        except RecordingError:
+            file.discard()
+            raise
         return file
 
     def _end_file(self, file: McapFile) -> None:
@@ -203,41 +214,6 @@ class BagWriter:
 
     def _count(self, current: FileEntry | None) -> int:
         return sum(entry.message_count for entry in self._metadata(current).files)
-
-
-def require_same_type(known: TopicInfo, topic: TopicInfo) -> None:
-    """Refuse a topic that is known with another type.
-
-    Raises:
-        TopicError: With both types.
-    """
-    if (known.type_name, known.type_hash) != (topic.type_name, topic.type_hash):
-        raise TopicError(
-            f"Topic {topic.name} is {known.type_name} ({known.type_hash}) in this bag,"
-            f" not {topic.type_name} ({topic.type_hash})"
-        )
-
-
-def require_message(topics: Mapping[str, TopicInfo], topic: str, data: bytes, log_time_ns: int) -> None:
-    """Refuse what a bag cannot store.
-
-    Args:
-        topics: Announced topics by name.
-        topic: Name of the topic.
-        data: The serialised message.
-        log_time_ns: When it was recorded, in [ns].
-
-    Raises:
-        TopicError: If the topic was not announced.
-        MessageError: If data or time cannot be stored.
-    """
-    if topic not in topics:
-        known = ", ".join(sorted(topics)) or "none"
-        raise TopicError(f"Topic {topic} was not announced to the bag; it knows {known}")
-    if not isinstance(data, bytes):
-        raise MessageError(f"A message on {topic} is a {type(data).__name__}, must be bytes")
-    if not isinstance(log_time_ns, int) or not 0 <= log_time_ns <= INFINITE_NS:
-        raise MessageError(f"A log time on {topic} is {log_time_ns!r}, must be in [0, {INFINITE_NS}] ns")
 
 
 def _create_directory(directory: Path) -> None:

@@ -48,20 +48,24 @@ def read_blocks(data: mmap) -> Iterator[Block | Damage]:
     """
     offset: int | None = len(MAGIC)
     chunked = False
+    # Where to look for the next chunk: behind the last record that a checksum vouches for, because
+    # one with a wrong length may have swallowed the beginning of what follows.
+    trusted = 0
     if data[: len(MAGIC)] != MAGIC:
         yield Damage(0, DamageKind.RECORD, "the magic bytes at the start are wrong")
     while offset is not None:
         try:
             block, end = read_block(data, offset, chunked)
         except UnreadableError as error:
-            resume = error.end if error.end is not None else find_chunk(data, offset + 1)
+            resume = error.end if error.end is not None else find_chunk(data, trusted)
             # What reaches beyond the end with a chunk behind it is no cut, but a wrong length.
             wrong_length = error.kind is DamageKind.CUT_OFF and resume is not None
             yield Damage(offset, DamageKind.RECORD if wrong_length else error.kind, str(error))
-            offset = resume
+            trusted, offset = offset + 1, resume
             continue
         yield block
-        chunked = chunked or block.compression is not None
+        if block.compression is not None:
+            chunked, trusted = True, end
         if block.records and isinstance(block.records[0], DataEnd):
             yield from _check_ending(data, block)
             return

@@ -71,9 +71,7 @@ class McapFile:
                 self._writer.start(PROFILE, LIBRARY)
                 sync_directory(self.path.parent)
         except RecordingError:
-            # A file without its first record would make a damaged bag of a good one.
-            self._file.close()
-            self.path.unlink()
+            self.discard()
             raise
 
     @property
@@ -148,6 +146,11 @@ class McapFile:
                     self._writer.finish()
         finally:
             self._close()
+
+    def discard(self) -> None:
+        """Remove a file that could not be begun: it would make a damaged bag of a good one."""
+        self._file.close()
+        self.path.unlink()
 
     def _close(self) -> None:
         try:

@@ -9,42 +9,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from walk_optimizer.recording.bag_writer import BagWriter, require_message, require_same_type
+from walk_optimizer.recording.bag_writer import BagWriter
 from walk_optimizer.recording.disk import free_bytes, nearest_directory
 from walk_optimizer.recording.errors import DiskFullError, RecordingError
 from walk_optimizer.recording.inbox import Inbox
 from walk_optimizer.recording.settings import RecorderSettings
-from walk_optimizer.recording.topics import TopicInfo
+from walk_optimizer.recording.status import RecorderStatus
+from walk_optimizer.recording.topics import TopicInfo, require_message, require_same_type
 
 DROPPED_KEY = "dropped_messages"
 """Key in the custom data of metadata.yaml under which a bag owns up to its gaps."""
 
 _logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class RecorderStatus:
-    """How a recording is going.
-
-    Attributes:
-        directory: The bag.
-        recording: Whether further messages are taken.
-        messages: Messages in the bag, those in the open chunk included.
-        stored_messages: Messages that a crash of this process cannot take away.
-        queued: Messages that wait for the disk.
-        dropped: Messages that were offered, but are not in the bag and will not be.
-        size_bytes: Size of the files on the disk in [byte].
-        error: Why the recording ended on its own; None if it did not.
-    """
-
-    directory: Path
-    recording: bool
-    messages: int
-    stored_messages: int
-    queued: int
-    dropped: int
-    size_bytes: int
-    error: RecordingError | None
 
 
 @dataclass(frozen=True)
@@ -102,6 +78,7 @@ class Recorder:
         self._error: RecordingError | None = None
         self._progress = _Progress()
         self._taken = 0
+        self._reported = 0
 
     def __enter__(self) -> "Recorder":
         """Start the recording."""
@@ -143,9 +120,8 @@ class Recorder:
         if self._thread is not None:
             raise RecordingError(f"The recorder of {self.directory} was started before")
         self._require_space(nearest_directory(self.directory))
-        writer = BagWriter(self.directory, self.settings, self._custom_data)
-        for topic in self._topics.values():
-            writer.add_topic(topic)
+        topics = tuple(self._topics.values())
+        writer = BagWriter(self.directory, self.settings, self._custom_data, topics)
         # A daemon, so that a program that forgets to stop can end; the exit hook closes its bag.
         self._thread = threading.Thread(target=self._run, args=(writer,), name="bag_recorder", daemon=True)
         self._thread.start()
@@ -211,23 +187,27 @@ class Recorder:
 
     def _record(self, writer: BagWriter) -> None:
         next_flush = time.monotonic() + self.settings.flush_period
-        reported = 0
         closed = False
         while not closed:
-            items, closed = self._inbox.take(max(0.0, next_flush - time.monotonic()))
+            items, closed = self._take(max(0.0, next_flush - time.monotonic()))
             for item in items:
                 self._store(writer, item)
             if time.monotonic() >= next_flush:
                 writer.flush()
-                reported = self._report_dropped(reported)
+                self._report_dropped()
                 next_flush = time.monotonic() + self.settings.flush_period
             self._note_progress(writer)
+
+    def _take(self, timeout: float) -> tuple[list[_Entry | TopicInfo], bool]:
+        """Take what waits in the queue, and count the messages that are from now on ours to store."""
+        items, closed = self._inbox.take(timeout)
+        self._taken += sum(isinstance(item, _Entry) for item in items)
+        return items, closed
 
     def _store(self, writer: BagWriter, item: _Entry | TopicInfo) -> None:
         if isinstance(item, TopicInfo):
             writer.add_topic(item)
             return
-        self._taken += 1
         size = writer.size
         writer.write(item.topic, item.data, item.log_time_ns, item.publish_time_ns)
         if writer.size != size:
@@ -241,22 +221,22 @@ class Recorder:
                 f" disk, and {least / 1e6:.1f} MB must stay free"
             )
 
-    def _report_dropped(self, reported: int) -> int:
-        dropped = self._inbox.rejected
-        if dropped > reported:
+    def _report_dropped(self) -> None:
+        dropped = self._inbox.rejected - self._reported
+        if dropped:
             _logger.warning(
                 "%s: %d messages dropped, the queue of %d was full",
                 self.directory,
-                dropped - reported,
+                dropped,
                 self.settings.queue_messages,
             )
-        return dropped
+        self._reported += dropped
 
     def _end(self, writer: BagWriter) -> None:
         """Close the bag, whatever happened to it, and count what is not in it."""
+        self._report_dropped()
         self._inbox.close()
-        left, _ = self._inbox.take(0.0)
-        self._taken += sum(isinstance(item, _Entry) for item in left)
+        self._take(0.0)
         lost = self._taken - writer.messages
         writer.custom_data[DROPPED_KEY] = str(self._inbox.rejected + lost)
         try:

@@ -65,7 +65,8 @@ def repair_bag(path: Path, destination: Path | None = None) -> RepairReport:
     """
     info = describe_bag(path)
     target = destination or path.absolute().with_name(f"{path.absolute().stem}_repaired")
-    writer = BagWriter(target, _settings(info), {**dict(info.custom_data), REPAIRED_FROM_KEY: path.name})
+    custom_data = {**dict(info.custom_data), REPAIRED_FROM_KEY: path.name}
+    writer = BagWriter(target, _settings(info), custom_data, info.topics)
     try:
         _copy(info, writer)
         writer.close()
@@ -91,8 +92,6 @@ def _settings(info: BagInfo) -> RecorderSettings:
 
 
 def _copy(info: BagInfo, writer: BagWriter) -> None:
-    for topic in info.topics:
-        writer.add_topic(topic)
     for number, file in enumerate(info.files):
         if number:
             writer.split()

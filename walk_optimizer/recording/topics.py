@@ -6,6 +6,8 @@ from typing import Any
 
 import yaml
 
+from walk_optimizer.recording.errors import MessageError, TopicError
+
 NANOSECONDS_PER_SECOND = 1_000_000_000
 
 INFINITE_NS = 9_223_372_036_854_775_807
@@ -120,6 +122,41 @@ def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
         return tuple(QosProfile.from_mapping(profile) for profile in yaml.safe_load(text) or ())
     except (yaml.YAMLError, KeyError, IndexError, TypeError, ValueError):
         return ()
+
+
+def require_same_type(known: TopicInfo, topic: TopicInfo) -> None:
+    """Refuse a topic that is known with another type.
+
+    Raises:
+        TopicError: With both types.
+    """
+    if (known.type_name, known.type_hash) != (topic.type_name, topic.type_hash):
+        raise TopicError(
+            f"Topic {topic.name} is {known.type_name} ({known.type_hash}) in this bag,"
+            f" not {topic.type_name} ({topic.type_hash})"
+        )
+
+
+def require_message(topics: Mapping[str, TopicInfo], topic: str, data: bytes, log_time_ns: int) -> None:
+    """Refuse what a bag cannot store.
+
+    Args:
+        topics: Announced topics by name.
+        topic: Name of the topic.
+        data: The serialised message.
+        log_time_ns: When it was recorded, in [ns].
+
+    Raises:
+        TopicError: If the topic was not announced.
+        MessageError: If data or time cannot be stored.
+    """
+    if topic not in topics:
+        known = ", ".join(sorted(topics)) or "none"
+        raise TopicError(f"Topic {topic} was not announced to the bag; it knows {known}")
+    if not isinstance(data, bytes):
+        raise MessageError(f"A message on {topic} is a {type(data).__name__}, must be bytes")
+    if not isinstance(log_time_ns, int) or not 0 <= log_time_ns <= INFINITE_NS:
+        raise MessageError(f"A log time on {topic} is {log_time_ns!r}, must be in [0, {INFINITE_NS}] ns")
 
 
 def _to_time(nanoseconds: int) -> dict[str, int]:

@@ -1,0 +1,289 @@
+"""Damage of every kind: found, named, and repaired without touching the original."""
+
+import random
+import shutil
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from recording.samples import JOINTS, PERIOD_NS, START_NS, STORE, joint_state, number_of, write_bag
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import Reader, StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagsWriter
+
+from walk_optimizer.recording import (
+    Compression,
+    RecorderSettings,
+    describe_bag,
+    format_bag,
+    read_messages,
+    repair_bag,
+)
+from walk_optimizer.recording.errors import BagExistsError, NotABagError
+from walk_optimizer.recording.records import DamageKind
+
+COUNT = 300
+CHUNK_BYTES = 8192
+EXAMPLES = settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A whole file, and where its chunks are by the word of the MCAP library."""
+
+    data: bytes
+    chunks: tuple[tuple[int, int, int], ...]  # start and end in [byte], joint states
+
+
+@cache
+def sample(compression: Compression) -> Sample:
+    with TemporaryDirectory() as folder:
+        chunked = RecorderSettings(chunk_bytes=CHUNK_BYTES, compression=compression)
+        path = write_bag(Path(folder) / "walk", range(COUNT), chunked) / "walk_0.mcap"
+        data = path.read_bytes()
+        with path.open("rb") as stream:
+            reader = make_reader(stream)
+            indexes = reader.get_summary().chunk_indexes
+            times = [message.log_time for _, _, message in reader.iter_messages(topics=[JOINTS.name])]
+    assert len(indexes) > 5
+    chunks = tuple(
+        (
+            index.chunk_start_offset,
+            index.chunk_start_offset + index.chunk_length,
+            sum(index.message_start_time <= time <= index.message_end_time for time in times),
+        )
+        for index in indexes
+    )
+    assert sum(count for _, _, count in chunks) == COUNT
+    return Sample(data, chunks)
+
+
+def joint_numbers(bag: Path) -> list[int]:
+    """Numbers of the joint states in a bag, read by rosbags, which validates the metadata too."""
+    with AnyReader([bag]) as reader:
+        return [number_of(raw) for c, _, raw in reader.messages() if c.topic == JOINTS.name]
+
+
+def flip(data: bytes, bit: int) -> bytes:
+    flipped = bytearray(data)
+    flipped[bit // 8] ^= 1 << bit % 8
+    return bytes(flipped)
+
+
+def check_repair(data: bytes, compression: Compression) -> tuple[list[int], list[DamageKind]]:
+    """Repair a file and return what is left of the joint states, and the damage found."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "walk_0.mcap"
+        path.write_bytes(data)
+        info = describe_bag(path)
+        report = repair_bag(path)
+        assert path.read_bytes() == data
+        assert sorted(item.name for item in Path(folder).iterdir()) == ["walk_0.mcap", "walk_0_repaired"]
+        repaired = describe_bag(report.destination)
+        assert repaired.is_whole
+        assert repaired.message_count == report.recovered_messages == info.message_count
+        if repaired.message_count:
+            assert repaired.compressions == ("" if compression is Compression.NONE else compression.value,)
+        numbers = joint_numbers(report.destination) if report.recovered_messages else []
+    return numbers, [damage.kind for damage in info.files[0].damage]
+
+
+@pytest.mark.parametrize("compression", list(Compression))
+@EXAMPLES
+@given(st.data())
+def test_a_cut_anywhere_costs_no_closed_chunk(compression, data):
+    whole = sample(compression)
+    cut = data.draw(st.integers(0, len(whole.data) - 1))
+    numbers, damage = check_repair(whole.data[:cut], compression)
+    assert numbers == list(range(sum(count for _, end, count in whole.chunks if end <= cut)))
+    # Cut behind the data, the file lacks its index only.
+    assert damage in ([DamageKind.CUT_OFF], [DamageKind.INDEX])
+
+
+@pytest.mark.parametrize("compression", list(Compression))
+@EXAMPLES
+@given(st.data())
+def test_a_flipped_bit_anywhere_is_found_and_costs_one_chunk_at_most(compression, data):
+    whole = sample(compression)
+    bit = data.draw(st.integers(0, 8 * len(whole.data) - 1))
+    numbers, damage = check_repair(flip(whole.data, bit), compression)
+    hit = [item for item in whole.chunks if item[0] <= bit // 8 < item[1]]
+    assert damage
+    assert numbers == sorted(set(numbers))
+    assert len(numbers) >= COUNT - sum(count for _, _, count in hit)
+
+
+@pytest.mark.parametrize("compression", list(Compression))
+@EXAMPLES
+@given(st.data())
+def test_any_bytes_over_any_stretch_leave_messages_in_order(compression, data):
+    whole = sample(compression)
+    start = data.draw(st.integers(0, len(whole.data)))
+    gone = data.draw(st.integers(0, 5000))
+    put = data.draw(st.binary(max_size=300))
+    numbers, _ = check_repair(whole.data[:start] + put + whole.data[start + gone :], compression)
+    # The stretch can touch all chunks between its ends; the others are whole.
+    hit = [item for item in whole.chunks if item[0] < start + gone + 1 and start <= item[1]]
+    first_hit = start < whole.chunks[0][1]
+    assert numbers == sorted(set(numbers))
+    assert first_hit or len(numbers) >= COUNT - sum(count for _, _, count in hit)
+
+
+@pytest.mark.parametrize("compression", list(Compression))
+def test_a_flipped_bit_in_a_message_is_found_by_its_checksum(tmp_path, compression):
+    whole = sample(compression)
+    start, end, count = whole.chunks[2]
+    (tmp_path / "walk.mcap").write_bytes(flip(whole.data, 8 * (start + end) // 2))
+    info = describe_bag(tmp_path / "walk.mcap")
+    report = repair_bag(tmp_path / "walk.mcap")
+    assert (report.damaged_chunks, report.damaged_records, report.cut_off) == (1, 0, False)
+    assert report.lost_messages == count
+    assert report.recovered_messages == COUNT + 1 - count
+    assert info.files[0].damage[0].offset == start
+    assert not info.is_whole
+    assert f"walk.mcap, byte {start}: a chunk is damaged" in format_bag(info)
+    assert f"{COUNT + 1 - count} messages recovered" in str(report)
+    assert f"at least {count} messages lost" in str(report)
+
+
+def test_a_chunk_length_beyond_the_end_costs_that_chunk_only():
+    whole = sample(Compression.NONE)
+    start, _, count = whole.chunks[1]
+    numbers, damage = check_repair(flip(whole.data, 8 * (start + 1) + 30), Compression.NONE)
+    assert len(numbers) == COUNT - count
+    assert damage == [DamageKind.RECORD, DamageKind.CHECKSUM]
+
+
+def test_topics_of_a_damaged_first_chunk_come_from_the_end_of_the_file():
+    whole = sample(Compression.ZSTD)
+    start, end, count = whole.chunks[0]
+    numbers, _ = check_repair(flip(whole.data, 4 * (start + end)), Compression.ZSTD)
+    assert numbers == list(range(count, COUNT))
+
+
+def test_messages_whose_topic_is_lost_are_counted(tmp_path):
+    """The first chunk holds the topics; damaged in a file without its end, it takes them along."""
+    whole = sample(Compression.NONE)
+    start, end, first = whole.chunks[0]
+    data = flip(whole.data, 4 * (start + end))[: whole.chunks[3][1]]
+    (tmp_path / "walk.mcap").write_bytes(data)
+    report = repair_bag(tmp_path / "walk.mcap")
+    assert report.recovered_messages == 0
+    assert report.lost_messages == first + 1 + sum(count for _, _, count in whole.chunks[1:4])
+
+
+def test_a_split_bag_keeps_its_files_and_its_texts(tmp_path):
+    bag = write_bag(tmp_path / "walk", range(2000), RecorderSettings(max_file_bytes=100_000))
+    last = sorted(bag.glob("*.mcap"), key=lambda path: int(path.stem.split("_")[1]))[-1]
+    last.write_bytes(last.read_bytes()[:-50])
+    before = {path.name: path.read_bytes() for path in bag.iterdir()}
+    report = repair_bag(bag)
+    assert {path.name: path.read_bytes() for path in bag.iterdir()} == before
+    assert report.destination == tmp_path / "walk_repaired"
+    assert report.recovered_messages == 2001
+    assert joint_numbers(report.destination) == list(range(2000))
+    assert len(describe_bag(report.destination).files) == len(before) - 1
+    assert dict(describe_bag(report.destination).custom_data)["repaired_from"] == "walk"
+    assert [message.topic.qos for message in read_messages(report.destination)][:2] == [
+        message.topic.qos for message in read_messages(bag)
+    ][:2]
+
+
+def test_a_bag_without_readable_metadata_is_still_a_bag(tmp_path):
+    bag = write_bag(tmp_path / "walk", range(10))
+    for text in ("", "rosbag2_bagfile_information: [", "rosbag2_bagfile_information: 3"):
+        (bag / "metadata.yaml").write_text(text)
+        assert describe_bag(bag).message_count == 11
+        assert not describe_bag(bag).has_metadata
+    (bag / "metadata.yaml").unlink()
+    report = repair_bag(bag)
+    assert report.recovered_messages == 11
+    with Reader(report.destination) as reader:
+        assert reader.message_count == 11
+
+
+def test_repair_overwrites_nothing(tmp_path):
+    bag = write_bag(tmp_path / "walk", range(10))
+    repair_bag(bag)
+    with pytest.raises(BagExistsError, match="walk_repaired exists already"):
+        repair_bag(bag)
+    assert repair_bag(bag, tmp_path / "elsewhere").recovered_messages == 11
+
+
+def test_a_failed_repair_leaves_nothing(tmp_path, monkeypatch):
+    bag = write_bag(tmp_path / "walk", range(10))
+    monkeypatch.setattr("walk_optimizer.recording.repair._copy", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        repair_bag(bag)
+    assert [path.name for path in tmp_path.iterdir()] == ["walk"]
+
+
+@pytest.mark.parametrize("use", [describe_bag, repair_bag, lambda path: list(read_messages(path))])
+@pytest.mark.parametrize("kind", ["missing", "empty folder", "text", "noise", "sqlite"])
+def test_what_is_no_bag_gives_one_typed_error(tmp_path, use, kind):
+    path = tmp_path / "walk"
+    if kind == "empty folder":
+        path.mkdir()
+    elif kind == "text":
+        path.write_text("a shopping list")
+    elif kind == "noise":
+        path.write_bytes(random.Random(1).randbytes(100_000))
+    elif kind == "sqlite":
+        with RosbagsWriter(path, version=9, storage_plugin=StoragePlugin.SQLITE3):
+            pass
+    with pytest.raises(NotABagError, match="walk"):
+        use(path)
+    assert not (tmp_path / "walk_repaired").exists()
+
+
+def test_a_sqlite_bag_is_named_as_one(tmp_path):
+    with RosbagsWriter(tmp_path / "walk", version=9, storage_plugin=StoragePlugin.SQLITE3):
+        pass
+    with pytest.raises(NotABagError, match="its storage is 'sqlite3', not 'mcap'"):
+        describe_bag(tmp_path / "walk")
+
+
+def test_a_bag_of_another_writer_is_described_and_read(tmp_path):
+    with RosbagsWriter(tmp_path / "walk", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection(JOINTS.name, JOINTS.type_name, typestore=STORE)
+        for number in range(100):
+            writer.write(connection, START_NS + number * PERIOD_NS, joint_state(number))
+    info = describe_bag(tmp_path / "walk")
+    assert info.is_whole
+    assert (info.message_count, info.start_time_ns, info.duration_ns) == (100, START_NS, 99 * PERIOD_NS)
+    assert [number_of(message.data) for message in read_messages(tmp_path / "walk")] == list(range(100))
+    assert next(read_messages(tmp_path / "walk")).topic.type_name == JOINTS.type_name
+
+
+def test_a_file_without_chunks_is_read(tmp_path):
+    with (tmp_path / "walk.mcap").open("wb") as stream:
+        writer = Writer(stream, use_chunking=False)
+        writer.start("ros2")
+        schema = writer.register_schema(JOINTS.type_name, "ros2msg", JOINTS.definition.encode())
+        channel = writer.register_channel(JOINTS.name, "cdr", schema)
+        for number in range(10):
+            writer.add_message(channel, number, joint_state(number), number)
+        writer.finish()
+    assert describe_bag(tmp_path / "walk.mcap").is_whole
+    shutil.copy(tmp_path / "walk.mcap", tmp_path / "cut.mcap")
+    data = (tmp_path / "walk.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: len(data) // 2])
+    numbers = [number_of(message.data) for message in read_messages(tmp_path / "cut.mcap")]
+    assert 0 < len(numbers) < 10
+    assert numbers == list(range(len(numbers)))
+
+
+def test_description_for_people(tmp_path):
+    bag = write_bag(tmp_path / "walk", range(1000), RecorderSettings(compression=Compression.LZ4))
+    text = format_bag(describe_bag(bag))
+    assert "State:       whole, all checksums right" in text
+    assert "Compression: lz4" in text
+    assert "Duration:    0.999000 s" in text
+    assert "Messages:    1001" in text
+    assert "/walker/joint_reference  sensor_msgs/msg/JointState  1000" in text
