@@ -18,6 +18,16 @@ from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.request import KMH_PER_MS, TABLE_SPEED_TOLERANCE, gait_table_settings
 from walk_optimizer.resources import data_folder
 
+__all__ = [
+    "GaitLibrary",
+    "GaitSummary",
+    "LibraryEntry",
+    "Selection",
+    "Source",
+    "cache_folder",
+    "table_folder",
+]
+
 
 class Selection(StrEnum):
     """Which gait answers a request for a speed."""

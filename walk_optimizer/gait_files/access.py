@@ -85,6 +85,32 @@ def writable_folder(folder: Path, create: bool) -> None:
         raise GaitFileError(f"{folder}: the gait folder is not writable: {error.strerror}") from error
 
 
+def writable_target(path: Path) -> None:
+    """Make sure, before any work, that a file can be put where a user wants it.
+
+    Raises:
+        GaitFileError: the folder is missing or not writable, or the path is a folder.
+    """
+    if path.is_dir():
+        raise GaitFileError(f"{path}: a folder, expected a file name")
+    if not path.absolute().parent.is_dir():
+        raise GaitFileError(f"{path}: the folder {path.absolute().parent} is missing")
+    if not os.access(path if path.exists() else path.absolute().parent, os.W_OK):
+        raise GaitFileError(f"{path}: not writable")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text for a user; not by renaming, so that it may also go to a device or through a link.
+
+    Raises:
+        GaitFileError: it can't be written.
+    """
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise GaitFileError(f"{path}: can't be written: {error.strerror}") from error
+
+
 def _sync_folder(folder: Path) -> None:
     """Wait until the disk knows the names in a folder."""
     descriptor = os.open(folder, os.O_RDONLY)

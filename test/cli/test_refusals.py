@@ -1,0 +1,139 @@
+"""Bad input is refused before any work, in one line that says what is allowed."""
+
+import time
+
+import pytest
+from cli.console import walk_optimizer
+
+from walk_optimizer.cli import main as main_module
+from walk_optimizer.cli.main import join_negative_values, main
+
+LIMITS = "allowed is 0.15 to 1.2 m/s (0.54 to 4.32 km/h)"
+
+BAD = [
+    (["--speed", "nan"], f"speed is nan m/s, {LIMITS}"),
+    (["--speed", "inf"], f"speed is inf m/s, {LIMITS}"),
+    (["--speed", "-inf"], f"speed is -inf m/s, {LIMITS}"),
+    (["--speed", "0"], f"speed is 0 m/s, {LIMITS}"),
+    (["--speed", "-0.3"], f"speed is -0.3 m/s, {LIMITS}"),
+    (["--speed", "-1.15km/h"], f"speed is -0.319444 m/s, {LIMITS}"),
+    (["--speed", "40km/h"], f"speed is 11.1111 m/s, {LIMITS}"),
+    (["--speed", "fast"], "speed 'fast' not understood; write 0.3185, 0.3185m/s or 1.15km/h"),
+    (["--speed", "0.7mph"], "speed '0.7mph' not understood"),
+    (["--speed", ""], "speed '' not understood"),
+    (["--speed", "0.3", "--spring", "rubber"], "unknown spring mode 'rubber'; allowed are none, stiffness, "),
+    (["--speed", "0.3", "--points", "0"], "N is 0 grid points, allowed is 20 to 2000"),
+    (["--speed", "0.3", "--points", "-5"], "N is -5 grid points, allowed is 20 to 2000"),
+    (["--speed", "0.3", "--points", "10000000"], "N is 10000000 grid points (about 400.0 GB), allowed is 20"),
+    (["--speed", "0.3", "--points", "2.5"], "N is '2.5' grid points, allowed is 20 to 2000"),
+    (["--speed", "0.3", "--time-limit", "0"], "time limit is '0', allowed are finite numbers above 0, in s"),
+    (["--speed", "0.3", "--time-limit", "soon"], "time limit is 'soon', allowed"),
+    (
+        ["--speed", "0.3", "--walker", "/nowhere/walker.yaml"],
+        "/nowhere/walker.yaml: can't be read: No such file",
+    ),
+    (
+        ["--speed", "0.3", "--export", "/nowhere/gait.csv"],
+        "/nowhere/gait.csv: the folder /nowhere is missing",
+    ),
+    (["--speed", "0.3", "--save", "--library", "/nowhere"], "/nowhere: the gait folder is missing"),
+    ([], "the following arguments are required: --speed"),
+    (["--speed"], "argument --speed: expected one argument"),
+    (["--speed", "0.3", "--sprin", "none"], "unrecognized arguments: --sprin none"),
+]
+
+
+@pytest.fixture
+def no_work(monkeypatch):
+    """Fail the test if a solve begins."""
+    from walk_optimizer.cli import gaits
+
+    def never(*arguments, **options):
+        raise AssertionError("a solve began")
+
+    monkeypatch.setattr(gaits, "optimize", never)
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD)
+def test_bad_input_of_solve_is_refused_in_one_line(no_work, capsys, arguments, message):
+    try:
+        code = main(["solve", *arguments])
+    except SystemExit as exit_:
+        code = exit_.code
+    printed = capsys.readouterr()
+    assert code == 2
+    assert message in printed.err
+    assert printed.err.count("\n") == 1
+    assert printed.out == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["export"], "say which gait: --speed SPEED [--spring MODE], or --file GAIT"),
+        (["export", "--speed", "9"], LIMITS),
+        (["export", "--speed", "0.3", "--format", "xml"], "invalid choice: 'xml'"),
+        (["export", "--file", "/nowhere/gait.npz"], "/nowhere/gait.npz: can't be read: No such file"),
+        (["picture", "--speed", "0.3", "--output", "gait.doc"], "a picture's name ends in .png, .pdf, .svg"),
+        (["picture", "--speed", "0.3", "--output", "/nowhere/gait.png"], "the folder /nowhere is missing"),
+        (["library", "verify", "--folder", "/nowhere"], "/nowhere: no gait files"),
+        (["bag", "info", "/nowhere"], "/nowhere"),
+        (["fly"], "invalid choice: 'fly'"),
+        ([], "the following arguments are required: VERB"),
+    ],
+)
+def test_the_other_verbs_refuse_too(no_work, capsys, arguments, message):
+    try:
+        code = main(arguments)
+    except SystemExit as exit_:
+        code = exit_.code
+    printed = capsys.readouterr()
+    assert code == 2
+    assert message in printed.err
+    assert printed.err.count("\n") == 1
+
+
+def test_the_script_refuses_without_a_traceback_and_at_once(tmp_path):
+    begin = time.monotonic()
+    done = walk_optimizer("solve", "--speed", "-1km/h", home=tmp_path)
+    assert time.monotonic() - begin < 5
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"walk-optimizer: speed is -0.277778 m/s, {LIMITS}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("given", "joined"),
+    [
+        (["solve", "--speed", "-1km/h"], ["solve", "--speed=-1km/h"]),
+        (["solve", "--speed", "-nan"], ["solve", "--speed=-nan"]),
+        (["solve", "--speed=1", "--save"], ["solve", "--speed=1", "--save"]),
+        (["-h"], ["-h"]),
+        (["solve", "--speed", "-h"], ["solve", "--speed", "-h"]),
+    ],
+)
+def test_negative_values_reach_the_core(given, joined):
+    assert join_negative_values(given) == joined
+
+
+def test_missing_matplotlib_is_named_with_its_remedy(capsys, monkeypatch, tmp_path):
+    import sys
+
+    for name in [name for name in sys.modules if name.split(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert main(["picture", "--speed", "0.3", "--output", str(tmp_path / "gait.png")]) == 2
+    assert "pip install 'walk-optimizer[figures]'" in capsys.readouterr().err
+
+
+def test_an_error_of_several_lines_is_printed_as_one(capsys, monkeypatch):
+    from walk_optimizer.errors import ConfigurationError
+
+    def fail(arguments):
+        raise ConfigurationError("one\n  two\nthree")
+
+    parser = main_module.build_parser()
+    monkeypatch.setattr(parser, "parse_args", lambda _: type("Args", (), {"run": staticmethod(fail)})())
+    monkeypatch.setattr(main_module, "build_parser", lambda: parser)
+    assert main(["table"]) == 2
+    assert capsys.readouterr().err == "walk-optimizer: one two three\n"

@@ -1,0 +1,1 @@
+"""The command line: one verb a file. Owns texts and exit codes; computes nothing."""

@@ -1,0 +1,102 @@
+"""Options that several verbs share, and what they mean to the core."""
+
+import argparse
+from pathlib import Path
+from typing import TypeAlias
+
+from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.model.parameters import SpringMode, WalkerParameters
+from walk_optimizer.request import GaitRequest, gait_table_settings, parse_speed
+
+# What `add_subparsers` returns; argparse gives the type no public name.
+Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001
+
+
+def add_verb(verbs: Subparsers, name: str, text: str, epilog: str = "") -> argparse.ArgumentParser:
+    """Return the parser of a new verb; the first line of the text also describes it in the list."""
+    return verbs.add_parser(
+        name,
+        help=text.splitlines()[0],
+        description=text,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+
+
+def add_walker(parser: argparse.ArgumentParser) -> None:
+    """Add the choice of a walker."""
+    parser.add_argument(
+        "--walker",
+        type=Path,
+        metavar="YAML",
+        help="parameters of another walker (default: config/walker.yaml)",
+    )
+
+
+def add_library(parser: argparse.ArgumentParser) -> None:
+    """Add the choice of the folder that gaits are stored in."""
+    parser.add_argument(
+        "--library", type=Path, metavar="FOLDER", help="folder of stored gaits (default: the user's cache)"
+    )
+
+
+def add_request(parser: argparse.ArgumentParser, required: bool = True) -> None:
+    """Add speed, spring mode and number of points."""
+    # Texts, not numbers: the core reads and refuses them, with the same words for every border.
+    parser.add_argument("--speed", required=required, metavar="SPEED", help="0.3185, 0.3185m/s or 1.15km/h")
+    parser.add_argument(
+        "--spring",
+        default=SpringMode.NONE.value,
+        metavar="MODE",
+        help=f"{', '.join(mode.value for mode in SpringMode)} (default: %(default)s)",
+    )
+    parser.add_argument("--points", metavar="N", help="grid points of a step (default: 200)")
+
+
+def add_gait_choice(parser: argparse.ArgumentParser) -> None:
+    """Add what says which gait: a request that the library or a solve answers, or a file."""
+    add_request(parser, required=False)
+    parser.add_argument("--file", type=Path, metavar="GAIT", help="a gait file instead of a request")
+    add_walker(parser)
+    add_library(parser)
+
+
+def walker_from(args: argparse.Namespace) -> WalkerParameters:
+    """Return the walker that was chosen."""
+    return WalkerParameters.from_yaml(args.walker)
+
+
+def request_from(args: argparse.Namespace) -> GaitRequest:
+    """Return the validated request."""
+    points = None if args.points is None else parse_points(args.points)
+    return GaitRequest.for_speed(parse_speed(args.speed), args.spring, points)
+
+
+def parse_points(text: str) -> int:
+    """Return a number of grid points.
+
+    Raises:
+        InvalidRequestError: the text is no whole number.
+    """
+    try:
+        return int(text)
+    except ValueError:
+        settings = gait_table_settings()
+        allowed = f"{settings.minimum_points} to {settings.maximum_points}"
+        raise InvalidRequestError(f"N is {text!r} grid points, allowed is {allowed}") from None
+
+
+def positive_seconds(text: str) -> float:
+    """Return a duration in [s].
+
+    Raises:
+        InvalidRequestError: the text is no finite number above 0.
+    """
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = float("nan")
+    if not 0 < seconds < float("inf"):
+        raise InvalidRequestError(f"time limit is {text!r}, allowed are finite numbers above 0, in s")
+    return seconds

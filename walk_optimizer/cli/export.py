@@ -1,0 +1,52 @@
+"""`export`: the numbers of a gait for other programs."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from walk_optimizer.cli.arguments import Subparsers, add_gait_choice, add_verb
+
+_TEXT = """\
+write the numbers of a gait as CSV
+
+One row a grid point, SI units. Lines `# key: value` before the column names give
+speed, step_length, step_time, N, spring mode, K, q_eq, friction and F.
+
+  time                     end of the interval from the start of the step
+  q1..q6, p1..p6           coordinates and momenta
+  u1, u2, u3               hip torque, knee torques of leg 1 (stance) and leg 2 (swing)
+  lambda1_xp, _xm, _y      ground reaction of foot 1 forward, backward, up; lambda2 of foot 2
+  gamma1, gamma2           slip speeds of the feet
+
+The gait comes from the library; one that the library lacks is solved."""
+
+_EPILOG = """\
+examples:
+  walk-optimizer export --speed 1.15km/h --spring stiffness --output gait.csv
+  walk-optimizer export --speed 0.3185 | python3 -c \\
+        "import sys, numpy; print(numpy.genfromtxt(sys.stdin, delimiter=',').shape)"
+"""
+
+
+def add_parser(verbs: Subparsers) -> None:
+    """Add the verb."""
+    parser = add_verb(verbs, "export", _TEXT, _EPILOG)
+    add_gait_choice(parser)
+    parser.add_argument("--format", choices=["csv"], default="csv", help="default: csv")
+    parser.add_argument("--output", type=Path, metavar="FILE", help="default: standard output")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the gait."""
+    from walk_optimizer.cli.gaits import chosen_gait
+    from walk_optimizer.gait_csv import gait_csv, write_csv
+    from walk_optimizer.gait_files.access import writable_target
+
+    if args.output is None:
+        sys.stdout.write(gait_csv(chosen_gait(args)))
+        return 0
+    writable_target(args.output)
+    write_csv(chosen_gait(args), args.output)
+    print(f"exported to {args.output}")
+    return 0

@@ -1,0 +1,61 @@
+"""Where a verb gets its gait from: a file, the library, or a solve."""
+
+import argparse
+import sys
+
+from walk_optimizer.cli.arguments import request_from, walker_from
+from walk_optimizer.cli.terminal import SolveProgress, interruptible
+from walk_optimizer.cli.text import request_text
+from walk_optimizer.errors import GaitNotFoundError, InvalidRequestError, SolveFailedError
+from walk_optimizer.gait import Gait
+from walk_optimizer.gait_files import read_gait_file
+from walk_optimizer.library import GaitLibrary
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.optimizer import Outcome, optimize
+from walk_optimizer.request import GaitRequest
+
+
+def solve(request: GaitRequest, walker: WalkerParameters, time_limit: float | None = None) -> Outcome:
+    """Return the outcome of a solve whose progress is shown on stderr.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C was pressed; the solve has ended.
+    """
+    with interruptible() as interrupt:
+        progress = SolveProgress(interrupt)
+        try:
+            return optimize(request, walker, time_limit=time_limit, progress=progress)
+        finally:
+            progress.close()
+
+
+def chosen_gait(args: argparse.Namespace) -> Gait:
+    """Return the gait that `add_gait_choice` asks for.
+
+    Without `--points` a gait of the library will do; what the library lacks is solved.
+
+    Raises:
+        WalkOptimizerError: the choice is impossible, or there is no such gait.
+    """
+    walker = walker_from(args)
+    if args.file is not None:
+        return read_gait_file(args.file, walker if args.walker else None).gait
+    if args.speed is None:
+        raise InvalidRequestError("say which gait: --speed SPEED [--spring MODE], or --file GAIT")
+    request = request_from(args)
+    try:
+        return _from_library(request, walker, args)
+    except GaitNotFoundError as error:
+        print(f"{error}; solving {request_text(request)}", file=sys.stderr)
+    outcome = solve(request, walker)
+    if outcome.gait is None:
+        raise SolveFailedError(f"no gait: {outcome.report.message}")
+    return outcome.gait
+
+
+def _from_library(request: GaitRequest, walker: WalkerParameters, args: argparse.Namespace) -> Gait:
+    """Return the library's gait; raise GaitNotFoundError also for another number of points than asked."""
+    gait, _ = GaitLibrary(walker, args.library).find(request.speed, request.spring_mode)
+    if args.points is not None and gait.request.points != request.points:
+        raise GaitNotFoundError(f"the library's gait has N = {gait.request.points}, not {request.points}")
+    return gait

@@ -1,0 +1,33 @@
+"""`table`: Table I of the report beside ours."""
+
+import argparse
+import sys
+
+from walk_optimizer.cli.arguments import Subparsers, add_library, add_verb, add_walker, walker_from
+
+_TEXT = """\
+show Table I of the report beside the gaits of the library
+
+K is the stiffness of the knee springs, q_eq the angle at which they are relaxed,
+F the sum over the grid points of |u|^2 / 2, and F% = 100 F / F without springs.
+A lower F% is better. The report does not give F itself."""
+
+
+def add_parser(verbs: Subparsers) -> None:
+    """Add the verb."""
+    parser = add_verb(verbs, "table", _TEXT)
+    add_walker(parser)
+    add_library(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the table."""
+    from walk_optimizer.cli.table_text import table_text
+    from walk_optimizer.library import GaitLibrary
+
+    library = GaitLibrary(walker_from(args), args.library)
+    print(table_text(library))
+    for problem in library.problems():
+        print(f"set aside: {problem}", file=sys.stderr)
+    return 0

@@ -1,0 +1,84 @@
+"""Table I of the report beside ours, as text: blocks of columns, one for each spring mode."""
+
+import math
+from collections.abc import Sequence
+
+from walk_optimizer.cli.text import aligned, number
+from walk_optimizer.errors import GaitNotFoundError
+from walk_optimizer.library import GaitLibrary
+from walk_optimizer.model.parameters import SpringMode
+from walk_optimizer.report_table import TABLE_I, ReportResult
+from walk_optimizer.request import KMH_PER_MS, gait_table_settings
+
+Rows = list[Sequence[str]]
+
+_LEGEND = """\
+F in (N m)^2, F% = 100 F / F of none at the same speed, K in N m/rad, q_eq in rad.
+A dash: not in the library."""
+
+
+def table_text(library: GaitLibrary) -> str:
+    """Return the table, one line for each speed of the gait table."""
+    speeds = gait_table_settings().table_speeds()
+    nominal = [_objective(library, speed, SpringMode.NONE) for speed in speeds]
+    blocks = [
+        _block("speed", [("m/s", "km/h", "report"), *_speed_rows(speeds)]),
+        _block("none", [("F",), *((number(value, ".4g"),) for value in nominal)]),
+    ]
+    for mode in (SpringMode.STIFFNESS, SpringMode.STIFFNESS_AND_EQUILIBRIUM):
+        reported = [row.results[mode] for row in TABLE_I]
+        blocks.append(_block(mode.value, _our_rows(library, mode, speeds, nominal)))
+        blocks.append(_block("report", _report_rows(reported)))
+    return "\n".join(" | ".join(line).rstrip() for line in zip(*blocks, strict=True)) + f"\n{_LEGEND}"
+
+
+def _block(title: str, rows: Rows) -> list[str]:
+    """Return the lines of a block, equally wide, under its title and a rule."""
+    lines = aligned(rows).splitlines()
+    width = max(len(title), *map(len, lines))
+    body = [line.rjust(width) for line in lines]
+    return [title.center(width), body[0], "-" * width, *body[1:]]
+
+
+def _speed_rows(speeds: Sequence[float]) -> Rows:
+    """Return speeds in both units and as the report prints them, cut off after two decimals."""
+    return [
+        (f"{speed:.4f}", f"{speed * KMH_PER_MS:.2f}", f"{row.speed_kmh:.2f}")
+        for speed, row in zip(speeds, TABLE_I, strict=True)
+    ]
+
+
+def _our_rows(
+    library: GaitLibrary, mode: SpringMode, speeds: Sequence[float], nominal: Sequence[float]
+) -> Rows:
+    """Return K, q_eq where it is free, F and F% of the library's gaits."""
+    free = mode is SpringMode.STIFFNESS_AND_EQUILIBRIUM
+    rows: Rows = [("K", *(["q_eq"] if free else []), "F", "F%")]
+    for speed, reference in zip(speeds, nominal, strict=True):
+        try:
+            gait, _ = library.find(speed, mode)
+        except GaitNotFoundError:
+            rows.append(["-"] * len(rows[0]))
+            continue
+        equilibrium = [f"{gait.spring.equilibrium:.3f}"] if free else []
+        share = number(100 * gait.objective / reference, ".1f")
+        rows.append((f"{gait.spring.stiffness:.2f}", *equilibrium, f"{gait.objective:.4g}", share))
+    return rows
+
+
+def _report_rows(results: Sequence[ReportResult]) -> Rows:
+    """Return K, q_eq where it was free, and F% of the report."""
+    free = results[0].equilibrium is not None
+    rows: Rows = [("K", *(["q_eq"] if free else []), "F%")]
+    for result in results:
+        equilibrium = [f"{result.equilibrium:.2f}"] if free else []
+        rows.append((f"{result.stiffness:.2f}", *equilibrium, f"{result.relative_objective:.0f}"))
+    return rows
+
+
+def _objective(library: GaitLibrary, speed: float, mode: SpringMode) -> float:
+    """Return F of a gait of the library, NaN when it is not there."""
+    try:
+        return library.find(speed, mode)[0].objective
+    except GaitNotFoundError:
+        return math.nan

@@ -1,0 +1,58 @@
+"""Recomputes the certificates of stored gaits, whatever the files say about themselves."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from walk_optimizer.certificate import certify
+from walk_optimizer.errors import GaitFileError
+from walk_optimizer.gait import Certificate, Gait
+from walk_optimizer.gait_files import SUFFIX, read_gait_file
+from walk_optimizer.model.parameters import WalkerParameters
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """What was found about one file.
+
+    Attributes:
+        path: The file.
+        gait: Its gait; None when it can't be read.
+        certificate: Residuals computed now; None without a gait.
+        problem: Why the file fails; empty when it does not.
+    """
+
+    path: Path
+    gait: Gait | None
+    certificate: Certificate | None
+    problem: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether the file holds a certified gait."""
+        return not self.problem
+
+
+def verify_file(path: Path, walker: WalkerParameters) -> Verification:
+    """Read a gait file and compute its certificate anew."""
+    try:
+        gait = read_gait_file(path, walker).gait
+    except GaitFileError as error:
+        return Verification(path, None, None, str(error))
+    certificate = certify(gait.walker, gait.request, gait.spring, gait.trajectory)
+    failed = ", ".join(
+        f"{entry.family} is {entry.violation:.3g} {entry.unit}, allowed {entry.tolerance:.3g}"
+        for entry in certificate.failures()
+    )
+    return Verification(path, gait, certificate, f"{path}: {failed}" if failed else "")
+
+
+def verify_folder(folder: Path, walker: WalkerParameters) -> list[Verification]:
+    """Verify every gait file of a folder, in the order of their names.
+
+    Raises:
+        GaitFileError: the folder is missing or holds no gait file: nothing verified is no success.
+    """
+    paths = sorted(path for path in folder.glob(f"*{SUFFIX}") if not path.name.startswith("."))
+    if not paths:
+        raise GaitFileError(f"{folder}: no gait files")
+    return [verify_file(path, walker) for path in paths]
