@@ -30,6 +30,11 @@ class CertificateEntry(FamilyViolation):
         """Whether the violation is within its tolerance; one that is not a number is not."""
         return self.violation <= self.tolerance
 
+    @property
+    def relative(self) -> float:
+        """Violation in units of its tolerance; infinite if it is not a number."""
+        return self.violation / self.tolerance if self.violation == self.violation else float("inf")
+
 
 @dataclass(frozen=True)
 class Certificate:
@@ -45,6 +50,11 @@ class Certificate:
     def certified(self) -> bool:
         """Whether every family is within its tolerance."""
         return bool(self.entries) and all(entry.met for entry in self.entries)
+
+    @property
+    def worst(self) -> CertificateEntry:
+        """The family closest to, or farthest beyond, its tolerance."""
+        return max(self.entries, key=lambda entry: entry.relative)
 
     def failures(self) -> tuple[CertificateEntry, ...]:
         """Return the families out of tolerance."""
@@ -75,6 +85,16 @@ class Trajectory:
         """Make every array read-only."""
         for name in ("time", "q", "p", "u", "reaction", "slip_speed"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @classmethod
+    def from_stacked(cls, points: FloatArray, step_time: float) -> "Trajectory":
+        """Return the trajectory of all quantities stacked, (23, N), of a step of `step_time` in [s]."""
+        time = step_time * np.arange(1, points.shape[1] + 1) / points.shape[1]
+        return cls(time, points[0:6], points[6:12], points[12:15], points[15:21], points[21:23])
+
+    def stacked(self) -> FloatArray:
+        """Return q, p, u, lambda and gamma as one array, (23, N)."""
+        return np.vstack([self.q, self.p, self.u, self.reaction, self.slip_speed])
 
     @property
     def points(self) -> int:

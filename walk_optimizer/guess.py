@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.contact.schedule import Schedule
 from walk_optimizer.model.functions import mass_matrices
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
@@ -76,12 +75,6 @@ def resampled(points: FloatArray, count: int) -> FloatArray:
     old = np.arange(1, points.shape[1] + 1) / points.shape[1]
     new = np.arange(1, count + 1) / count
     return np.array([np.interp(new, old, row) for row in points])
-
-
-def resampled_schedule(schedule: Schedule, count: int) -> Schedule:
-    """Return the schedule (2, N) on `count` grid points of the same step."""
-    nearest = np.ceil(np.arange(1, count + 1) * schedule.shape[1] / count).astype(int) - 1
-    return schedule[:, nearest]
 
 
 @dataclass(frozen=True)

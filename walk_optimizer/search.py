@@ -1,0 +1,153 @@
+"""The solves that a search for gaits is made of: from one candidate to a better one."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.contact.schedule import CONTACT_FAMILIES, Schedule, observed_schedule
+from walk_optimizer.gait import Gait
+from walk_optimizer.guess import Start, kinematic_guess, resampled
+from walk_optimizer.model.functions import evaluate
+from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.request import GaitRequest
+from walk_optimizer.solve.session import SolveSession
+from walk_optimizer.solve.status import Status
+from walk_optimizer.transcription import layout
+from walk_optimizer.transcription.problems import (
+    complementarity_problem,
+    fixed_schedule_problem,
+    from_scaled,
+    to_scaled,
+)
+from walk_optimizer.transcription.program import Problem
+from walk_optimizer.transcription.scaling import torque_unit
+
+FloatArray = NDArray[np.float64]
+
+# Optima whose objectives agree to this relative difference are taken for one.
+SAME_OPTIMUM = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An iterate of the search, good or bad.
+
+    Attributes:
+        name: Of the start that it came from.
+        contacts: Its contact family, or `found` where complementarity changed it.
+        points: All grid points in SI units, (23, N).
+        spring: K and q_eq.
+        status: How its last solve ended.
+    """
+
+    name: str
+    contacts: str
+    points: FloatArray
+    spring: KneeSpring
+    status: Status
+
+    @property
+    def solved(self) -> bool:
+        """Whether its last solve converged."""
+        return self.status is Status.SOLVED
+
+    @property
+    def mean_effort(self) -> float:
+        """Mean of 1/2 |u|^2 over the points in [(N m)^2]: comparable between grids."""
+        return float(np.sum(self.points[layout.U] ** 2) / 2 / self.points.shape[1])
+
+    @property
+    def objective(self) -> float:
+        """F, the sum over the points of 1/2 |u|^2 in [(N m)^2]."""
+        return self.mean_effort * self.points.shape[1]
+
+
+def distinct(candidates: Iterable[Candidate]) -> list[Candidate]:
+    """Return the solved candidates, best first, each optimum once."""
+    kept: list[Candidate] = []
+    for candidate in sorted((one for one in candidates if one.solved), key=lambda one: one.mean_effort):
+        if not kept or candidate.mean_effort > kept[-1].mean_effort * (1 + SAME_OPTIMUM):
+            kept.append(candidate)
+    return kept
+
+
+class Search:
+    """The solves of one request, all within one session."""
+
+    def __init__(
+        self, request: GaitRequest, walker: WalkerParameters, session: SolveSession, relaxation: float
+    ) -> None:
+        """Prepare a search.
+
+        Args:
+            request: Speed, step, spring mode and grid.
+            walker: The walker.
+            session: Clock, cancelling and progress of all solves.
+            relaxation: Bound on each complementarity product, in units of weight times 1 m or 1 m/s.
+        """
+        self.request, self.walker, self.session, self.relaxation = request, walker, session, relaxation
+
+    def from_start(self, start: Start, points: int) -> Candidate:
+        """Return the optimum of single support that a kinematic guess on `points` grid points leads to."""
+        request = replace(self.request, points=points)
+        guess = kinematic_guess(self.walker, request, start.shape)
+        candidate = Candidate(start.name, "single-impact", guess, start.spring, Status.SOLVED)
+        return self.with_family(candidate, "single-impact", points, "search")
+
+    def from_gait(self, gait: Gait, contacts: str) -> Candidate:
+        """Return the optimum that continues a gait of another request with a contact family."""
+        name = f"continued-{gait.speed:.4f}-{gait.request.spring_mode.value}"
+        candidate = Candidate(name, contacts, gait.trajectory.stacked(), gait.spring, Status.SOLVED)
+        return self.with_family(candidate, contacts, self.request.points, "continuation")
+
+    def with_family(self, candidate: Candidate, contacts: str, points: int, stage: str) -> Candidate:
+        """Return the candidate solved on `points` grid points with a contact family."""
+        guess = replace(candidate, contacts=contacts, points=resampled(candidate.points, points))
+        return self._with_schedule(guess, CONTACT_FAMILIES[contacts](points), stage)
+
+    def with_free_contacts(self, best: Candidate) -> Candidate:
+        """Return the optimum with the contacts that complementarity finds; `best` if those are no better.
+
+        The contacts found are solved once more as a fixed schedule, so that every product of the
+        result is zero and not merely small. That also decides whether they are worth having, so
+        the relaxed problem itself need not have converged.
+        """
+        start = replace(best, points=self._with_slip_speeds(best.points))
+        problem = complementarity_problem(self.request, self.walker, self.relaxation)
+        relaxed = self._solve(problem, start, "complementarity", warm=True)
+        schedule = self._observed(relaxed)
+        found = self._with_schedule(replace(relaxed, contacts="found"), schedule, "polish", warm=True)
+        return found if found.solved and found.mean_effort < best.mean_effort * (1 - SAME_OPTIMUM) else start
+
+    def _with_schedule(self, guess: Candidate, schedule: Schedule, stage: str, *, warm: bool = False) -> Candidate:
+        request = replace(self.request, points=schedule.shape[1])
+        solved = self._solve(fixed_schedule_problem(request, self.walker, schedule), guess, stage, warm=warm)
+        return replace(solved, points=self._with_slip_speeds(solved.points))
+
+    def _solve(self, problem: Problem, guess: Candidate, stage: str, *, warm: bool) -> Candidate:
+        unit = torque_unit(self.walker) ** 2 * guess.points.shape[1]
+        start = to_scaled(self.walker, guess.points, guess.spring)
+        solution = self.session.solve(problem, start, stage, objective_unit=unit, warm=warm)
+        points, spring = from_scaled(self.walker, solution.x)
+        return replace(guess, points=points, spring=spring, status=solution.status)
+
+    def _slip(self, points: FloatArray) -> FloatArray:
+        """Return the tangential velocity of both feet, (2, N)."""
+        return evaluate("foot_velocities", self.walker, points[layout.Q], points[layout.P])[:, 0, :].T
+
+    def _with_slip_speeds(self, points: FloatArray) -> FloatArray:
+        """Return the points with gamma = |slip|, the least that eqs. (5c) and (5d) allow."""
+        completed = points.copy()
+        completed[layout.SLIP] = np.abs(self._slip(points))
+        return completed
+
+    def _observed(self, candidate: Candidate) -> Schedule:
+        """Return the contacts that a solution of the complementarity problem uses."""
+        walker, q = self.walker, candidate.points[layout.Q]
+        forces = candidate.points[layout.REACTION].reshape(2, 3, -1) / walker.weight
+        normal = forces[:, 2]
+        cone_slack = walker.friction_coefficient * normal - forces[:, 0] - forces[:, 1]
+        heights = evaluate("feet", walker, q, np.zeros_like(q))[:, 1, :].T
+        return observed_schedule(heights / walker.leg_length, normal, cone_slack, self._slip(candidate.points))
