@@ -6,16 +6,13 @@ from setuptools import find_packages, setup
 
 SHARE = "share/walk_optimizer"
 
-# The middleware, the message packages that the nodes use, and the bag writer.
+# The middleware and the message packages that the nodes use.
 ROS = [
     "ros-jazzy-rclpy[fastrtps]>=7.1,<8",
     "ros-jazzy-builtin-interfaces>=2.0,<3",
     "ros-jazzy-std-msgs>=5.3,<6",
     "ros-jazzy-sensor-msgs>=5.3,<6",
     "ros-jazzy-trajectory-msgs>=5.3,<6",
-    "mcap>=1.2,<2",
-    "lz4>=4",
-    "zstandard>=0.22",
 ]
 
 # What CMake needs to build walk_optimizer_interfaces. The generators do not require all of the
@@ -71,7 +68,7 @@ setup(
         "Topic :: Scientific/Engineering",
         "Typing :: Typed",
     ],
-    python_requires=">=3.10",
+    python_requires=">=3.11",
     packages=find_packages(include=["walk_optimizer", "walk_optimizer.*"]),
     package_data={"walk_optimizer": ["py.typed", "data/**"]},
     data_files=[
@@ -88,6 +85,10 @@ setup(
         "numpy>=1.26,<3",
         "scipy>=1.11,<2",
         "PyYAML>=6,<7",
+        # Bags are read and repaired without ROS too.
+        "mcap>=1.5,<2",
+        "lz4>=4",
+        "zstandard>=0.22",
     ],
     extras_require={
         "ros": ROS,

@@ -32,7 +32,7 @@ SHARED_FOLDERS = ("config", "launch", "urdf")
 BUILD = VENV / "build" / "walk_optimizer_interfaces"
 
 # The wheels exist for these versions of Python.
-OLDEST = (3, 10)
+OLDEST = (3, 11)
 NEWEST = (3, 13)
 
 # The folders that hold Python's and NumPy's headers on the machine that built the wheels.

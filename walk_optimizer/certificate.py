@@ -104,7 +104,7 @@ def _state_before(q: FloatArray, p: FloatArray, step_length: float) -> tuple[Flo
 
 
 def landing_distance(walker: WalkerParameters, trajectory: Trajectory) -> float:
-    """Return where foot 2 lands ahead of where foot 1 stood at the start of the step: the step length in [m]."""
+    """Return the step length in [m]: where foot 2 lands, foot 1 having stood at the origin."""
     return float(_leg(walker, trajectory.q[:, -1:], 1)[2].position[0, 0])
 
 
@@ -163,15 +163,24 @@ def _bound_entries(walker: WalkerParameters, trajectory: Trajectory) -> list[Cer
     """Return the violations of the bounds on angles, forces, slip speeds and forward momentum."""
     hips, knees = trajectory.q[[2, 4]], trajectory.q[[3, 5]]
     angle = max(
-        0.0, float(np.abs(hips).max() - walker.hip_angle_limit), float(-knees.min()), float(knees.max() - np.pi)
+        0.0,
+        float(np.abs(hips).max() - walker.hip_angle_limit),
+        float(-knees.min()),
+        float(knees.max() - np.pi),
     )
     force_tolerance = RELATIVE_TOLERANCE * walker.weight
     momentum_tolerance = RELATIVE_TOLERANCE * walker.total_mass
     return [
         CertificateEntry("joint_limits", angle, "rad", _BOUND_TOLERANCE),
-        CertificateEntry("unilateral_force", max(0.0, float(-trajectory.reaction.min())), "N", force_tolerance),
-        CertificateEntry("slip_speed_sign", max(0.0, float(-trajectory.slip_speed.min())), "m/s", _BOUND_TOLERANCE),
-        CertificateEntry("forward_momentum", max(0.0, float(-trajectory.p[0].min())), "kg m/s", momentum_tolerance),
+        CertificateEntry(
+            "unilateral_force", max(0.0, float(-trajectory.reaction.min())), "N", force_tolerance
+        ),
+        CertificateEntry(
+            "slip_speed_sign", max(0.0, float(-trajectory.slip_speed.min())), "m/s", _BOUND_TOLERANCE
+        ),
+        CertificateEntry(
+            "forward_momentum", max(0.0, float(-trajectory.p[0].min())), "kg m/s", momentum_tolerance
+        ),
     ]
 
 

@@ -25,6 +25,10 @@ class CertificateEntry(FamilyViolation):
 
     tolerance: float
 
+    def __str__(self) -> str:
+        """Return the entry as part of a sentence."""
+        return f"{self.family} is off by {self.violation:.3g} {self.unit}, allowed is {self.tolerance:.3g}"
+
     @property
     def met(self) -> bool:
         """Whether the violation is within its tolerance; one that is not a number is not."""

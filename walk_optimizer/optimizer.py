@@ -135,13 +135,15 @@ class _Pipeline:
     def _report(self, status: Status, candidate: Candidate, certificate: Certificate) -> SolveReport:
         worst, message = certificate.worst, status.sentence
         if not worst.met:
-            message += f"; worst is {worst.family}: {worst.violation:.3g} {worst.unit}, allowed {worst.tolerance:.3g}"
+            message += f"; {worst}"
         return replace(
             self._bare_report(status),
             message=message,
             start=f"{candidate.name}, {candidate.contacts}",
             objective=candidate.objective,
-            violations=tuple(FamilyViolation(one.family, one.violation, one.unit) for one in certificate.entries),
+            violations=tuple(
+                FamilyViolation(one.family, one.violation, one.unit) for one in certificate.entries
+            ),
         )
 
     def _bare_report(self, status: Status) -> SolveReport:

@@ -71,11 +71,13 @@ class GaitTableSettings:
         return [length / time for length, time in self.table_steps()]
 
     def step_for_speed(self, speed: float) -> tuple[float, float]:
-        """Return step length in [m] and step time in [s] of a speed, on the line through the table's steps."""
+        """Return step length in [m] and step time in [s] of a speed, on the line of the table."""
         length_span = self.fastest_step_length - self.slowest_step_length
         time_span = self.fastest_step_time - self.slowest_step_time
         # slowest_length + s length_span = speed (slowest_time + s time_span), solved for s.
-        place = (speed * self.slowest_step_time - self.slowest_step_length) / (length_span - speed * time_span)
+        place = (speed * self.slowest_step_time - self.slowest_step_length) / (
+            length_span - speed * time_span
+        )
         return self._step(place)
 
     def _step(self, place: float) -> tuple[float, float]:
@@ -173,7 +175,11 @@ def _checked_points(points: int | None, settings: GaitTableSettings) -> int:
         return settings.points
     low, high = settings.minimum_points, settings.maximum_points
     if isinstance(points, bool) or not isinstance(points, int) or not low <= points <= high:
-        estimate = f" (about {points * _BYTES_PER_POINT / 1e9:.1f} GB)" if isinstance(points, int) and points > high else ""
+        estimate = (
+            f" (about {points * _BYTES_PER_POINT / 1e9:.1f} GB)"
+            if isinstance(points, int) and points > high
+            else ""
+        )
         raise InvalidRequestError(f"N is {points!r} grid points{estimate}, allowed is {low} to {high}")
     return points
 

@@ -13,10 +13,10 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def _share_folders() -> list[Path]:
-    """Return the folders that may hold `config/`: a checkout, then pip's and ament's share folders."""
+    """Return the folders that may hold `config/`: a checkout, then ament's and pip's share folders."""
     checkout = _PACKAGE.parent
     folders = [checkout] if (checkout / "package.xml").is_file() else []
-    prefixes = [sys.prefix, *os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)]
+    prefixes = [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix]
     return folders + [Path(prefix) / "share" / "walk_optimizer" for prefix in prefixes if prefix]
 
 

@@ -56,12 +56,12 @@ class Candidate:
     @property
     def mean_effort(self) -> float:
         """Mean of 1/2 |u|^2 over the points in [(N m)^2]: comparable between grids."""
-        return float(np.sum(self.points[layout.U] ** 2) / 2 / self.points.shape[1])
+        return self.objective / self.points.shape[1]
 
     @property
     def objective(self) -> float:
         """F, the sum over the points of 1/2 |u|^2 in [(N m)^2]."""
-        return self.mean_effort * self.points.shape[1]
+        return float(np.sum(self.points[layout.U] ** 2) / 2)
 
 
 def distinct(candidates: Iterable[Candidate]) -> list[Candidate]:
@@ -121,9 +121,12 @@ class Search:
         found = self._with_schedule(replace(relaxed, contacts="found"), schedule, "polish", warm=True)
         return found if found.solved and found.mean_effort < best.mean_effort * (1 - SAME_OPTIMUM) else start
 
-    def _with_schedule(self, guess: Candidate, schedule: Schedule, stage: str, *, warm: bool = False) -> Candidate:
+    def _with_schedule(
+        self, guess: Candidate, schedule: Schedule, stage: str, *, warm: bool = False
+    ) -> Candidate:
         request = replace(self.request, points=schedule.shape[1])
-        solved = self._solve(fixed_schedule_problem(request, self.walker, schedule), guess, stage, warm=warm)
+        problem = fixed_schedule_problem(request, self.walker, schedule)
+        solved = self._solve(problem, guess, stage, warm=warm)
         return replace(solved, points=self._with_slip_speeds(solved.points))
 
     def _solve(self, problem: Problem, guess: Candidate, stage: str, *, warm: bool) -> Candidate:
@@ -150,4 +153,5 @@ class Search:
         normal = forces[:, 2]
         cone_slack = walker.friction_coefficient * normal - forces[:, 0] - forces[:, 1]
         heights = evaluate("feet", walker, q, np.zeros_like(q))[:, 1, :].T
-        return observed_schedule(heights / walker.leg_length, normal, cone_slack, self._slip(candidate.points))
+        slip = self._slip(candidate.points)
+        return observed_schedule(heights / walker.leg_length, normal, cone_slack, slip)

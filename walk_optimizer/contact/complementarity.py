@@ -15,7 +15,9 @@ def net_force(reaction: ca.SX) -> ca.SX:
     Args:
         reaction: lambda, (6,): x+, x-, y of foot 1, then of foot 2.
     """
-    return ca.horzcat(*(ca.vertcat(reaction[3 * j] - reaction[3 * j + 1], reaction[3 * j + 2]) for j in range(2)))
+    return ca.horzcat(
+        *(ca.vertcat(reaction[3 * j] - reaction[3 * j + 1], reaction[3 * j + 2]) for j in range(2))
+    )
 
 
 def foot_pairs(

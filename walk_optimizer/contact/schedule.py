@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-
 class FootMode(IntEnum):
     """The behaviours that the complementarity pairs of a foot allow (report section II-A)."""
 

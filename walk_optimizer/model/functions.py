@@ -37,7 +37,11 @@ def model_function(name: str) -> ca.Function:
 
 
 def evaluate(
-    name: str, walker: WalkerParameters, q: FloatArray, p: FloatArray, spring: tuple[float, float] = (0.0, 0.0)
+    name: str,
+    walker: WalkerParameters,
+    q: FloatArray,
+    p: FloatArray,
+    spring: tuple[float, float] = (0.0, 0.0),
 ) -> FloatArray:
     """Return a quantity of the model at each of N states.
 
@@ -54,7 +58,7 @@ def evaluate(
     function, count = model_function(name), q.shape[1]
     rows, columns = function.size_out(0)
     values = function.map(count)(q, p, np.tile(walker.vector(), (count, 1)).T, np.tile(spring, (count, 1)).T)
-    stacked = np.asarray(values).reshape(rows, count, columns).transpose(1, 0, 2)
+    stacked: FloatArray = np.asarray(values).reshape(rows, count, columns).transpose(1, 0, 2)
     return stacked[:, :, 0] if columns == 1 else stacked
 
 

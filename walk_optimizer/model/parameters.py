@@ -106,7 +106,8 @@ class WalkerParameters:
         unknown = sorted(set(entries) - known)
         if unknown:
             raise ConfigurationError(
-                f"{source}: unknown walker parameter {', '.join(unknown)}; known are {', '.join(sorted(known))}"
+                f"{source}: unknown walker parameter {', '.join(unknown)}; "
+                f"known are {', '.join(sorted(known))}"
             )
         return cls(**entries)
 

@@ -55,7 +55,7 @@ class _Watcher(ca.Callback):
 
     def __init__(self, nlp: Nlp) -> None:
         super().__init__()
-        self._sizes = (nlp.expressions["x"].numel(), nlp.expressions["g"].numel(), nlp.expressions["p"].numel())
+        self._sizes = tuple(nlp.expressions[name].numel() for name in ("x", "g", "p"))
         self.monitor: Monitor | None = None
         self.problem: Problem | None = None
         self.verdict: Status | None = None
@@ -117,7 +117,9 @@ def _instance(nlp: Nlp, options: IpoptOptions) -> _Instance:
     return of_program[options]
 
 
-def solve(problem: Problem, start: FloatArray, options: IpoptOptions, monitor: Monitor | None = None) -> Solution:
+def solve(
+    problem: Problem, start: FloatArray, options: IpoptOptions, monitor: Monitor | None = None
+) -> Solution:
     """Solve a program from a start.
 
     Args:
@@ -142,4 +144,5 @@ def solve(problem: Problem, start: FloatArray, options: IpoptOptions, monitor: M
     detail = statistics["return_status"]
     status = instance.watcher.verdict or _STATUS.get(detail, Status.EVALUATION_ERROR)
     x, g = (np.asarray(result[name]).ravel() for name in ("x", "g"))
-    return Solution(status, x, float(result["f"]), problem.infeasibility(x, g), statistics["iter_count"], detail)
+    infeasibility, iterations = problem.infeasibility(x, g), statistics["iter_count"]
+    return Solution(status, x, float(result["f"]), infeasibility, iterations, detail)

@@ -12,7 +12,9 @@ from walk_optimizer.transcription.program import Problem
 class SolveSession:
     """Runs solves until the time limit or a cancel; after that every solve ends at once."""
 
-    def __init__(self, settings: SolverSettings, time_limit: float, progress: ProgressCallback | None) -> None:
+    def __init__(
+        self, settings: SolverSettings, time_limit: float, progress: ProgressCallback | None
+    ) -> None:
         """Start the clock.
 
         Args:

@@ -39,7 +39,9 @@ class SolverSettings:
         for field in fields(self)[1:]:
             value = getattr(self, field.name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
-                raise ConfigurationError(f"solver setting {field.name} is {value!r}, expected a positive number")
+                raise ConfigurationError(
+                    f"solver setting {field.name} is {value!r}, expected a positive number"
+                )
 
     @classmethod
     def from_yaml(cls, path: Path | None = None) -> "SolverSettings":

@@ -156,17 +156,21 @@ def assemble(rows: NDArray[np.bool_]) -> Nlp:
     torques = graph.w[layout.U, :]
     objective = ca.sumsqr(torques) / (2 * graph.points)
     sigma, lam = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", graph.row_count)
-    gradient = ca.vertcat(
-        ca.vec(ca.vertcat(ca.MX.zeros(12, graph.points), torques / graph.points, ca.MX.zeros(8, graph.points))),
-        ca.MX.zeros(layout.SPRING_WIDTH, 1),
+    above, below = layout.U.start, layout.POINT_WIDTH - layout.U.stop
+    columns = ca.vertcat(
+        ca.MX.zeros(above, graph.points), torques / graph.points, ca.MX.zeros(below, graph.points)
     )
+    gradient = ca.vertcat(ca.vec(columns), ca.MX.zeros(layout.SPRING_WIDTH, 1))
     names = ["x", "p"]
     return Nlp(
         expressions={"x": x, "p": p, "f": objective, "g": graph.rows()},
         jacobian=ca.Function("nlp_jac_g", [x, p], list(graph.jacobian()), names, ["g", "jac_g_x"]),
         hessian=ca.Function(
-            "nlp_hess_l", [x, p, sigma, lam], [graph.hessian(sigma, lam)],
-            [*names, "lam_f", "lam_g"], ["triu_hess_gamma_x_x"],
+            "nlp_hess_l",
+            [x, p, sigma, lam],
+            [graph.hessian(sigma, lam)],
+            [*names, "lam_f", "lam_g"],
+            ["triu_hess_gamma_x_x"],
         ),
         gradient=ca.Function("nlp_grad_f", [x, p], [objective, gradient], names, ["f", "grad_f_x"]),
     )

@@ -10,11 +10,12 @@ from walk_optimizer.transcription import layout
 from walk_optimizer.transcription.scaling import point_units, row_units, spring_units
 
 
-def physical_rows(walker: SymbolicWalker) -> ca.Function:
-    """Return (point, state before, spring, h) -> the 28 rows of a grid point, all in SI units.
+def physical_rows() -> ca.Function:
+    """Return (point, state before, spring, h, walker) -> the 28 rows of a grid point, all in SI units.
 
     The rows are the dynamics, the sides a of the pairs and their products a b.
     """
+    walker = SymbolicWalker()
     column, previous = ca.SX.sym("point", layout.POINT_WIDTH), ca.SX.sym("previous", 12)
     spring, interval = ca.SX.sym("spring", 2), ca.SX.sym("h")
     point = layout.Point.of(column)
@@ -24,8 +25,8 @@ def physical_rows(walker: SymbolicWalker) -> ca.Function:
     state = ca.vertcat(point.q, point.p)
     a, b = contact_pairs(walker, point.q, qdot, point.reaction, point.slip_speed)
     rows = ca.vertcat(state - previous - interval * ca.vertcat(qdot, pdot), a, a * b)
-    options = {"allow_free": True}
-    return ca.Function("physical_rows", [column, previous, spring, interval], [rows], options)
+    inputs = [column, previous, spring, interval, walker.symbols]
+    return ca.Function("physical_rows", inputs, [rows])
 
 
 def stage_functions() -> list[ca.Function]:
@@ -41,7 +42,7 @@ def stage_functions() -> list[ca.Function]:
     w, z, s = ca.SX.sym("w", layout.POINT_WIDTH), ca.SX.sym("z", 12), ca.SX.sym("s", 2)
     units = ca.vertcat(*point_units(walker))
     spring = s * ca.vertcat(*spring_units(walker))
-    rows = physical_rows(walker)(w * units, z * units[:12], spring, interval)
+    rows = physical_rows()(w * units, z * units[:12], spring, interval, walker.symbols)
     rows = rows / ca.vertcat(*row_units(walker))
     variables = ca.vertcat(w, s)
     lagrangian = sigma * ca.sumsqr(w[layout.U]) / 2 + ca.dot(lam, rows)

@@ -24,7 +24,8 @@ _FORWARD, _BACKWARD, _NORMAL = range(3)
 def to_scaled(walker: WalkerParameters, points: FloatArray, spring: KneeSpring) -> FloatArray:
     """Return the scaled vector of all variables, (23 N + 2,), from points (23, N) in SI units."""
     units, spring_unit = np.array(point_units(walker)), np.array(spring_units(walker))
-    return layout.pack(points / units[:, None], np.array([spring.stiffness, spring.equilibrium]) / spring_unit)
+    scaled_spring = np.array([spring.stiffness, spring.equilibrium]) / spring_unit
+    return layout.pack(points / units[:, None], scaled_spring)
 
 
 def from_scaled(walker: WalkerParameters, x: FloatArray) -> tuple[FloatArray, KneeSpring]:

@@ -26,7 +26,7 @@ class Sized(Protocol):
         """Weight in [N]."""
 
 
-def point_units(walker: Sized) -> list:
+def point_units(walker: Sized) -> list[ca.SX]:
     """Return the unit of each row of a grid point's column, 23 values."""
     momentum = walker.total_mass
     lengths = [walker.leg_length] * 2 + [1.0] * 4
@@ -39,12 +39,12 @@ def torque_unit(walker: Sized) -> ca.SX:
     return TORQUE_FRACTION * walker.weight * walker.leg_length
 
 
-def spring_units(walker: Sized) -> list:
+def spring_units(walker: Sized) -> list[ca.SX]:
     """Return the units of K and q_eq."""
     return [STIFFNESS_FRACTION * walker.weight * walker.leg_length, 1.0]
 
 
-def row_units(walker: Sized) -> list:
+def row_units(walker: Sized) -> list[ca.SX]:
     """Return the unit of each row of a grid point's constraints, 28 values, in the order of the layout."""
     foot = [walker.leg_length, walker.weight, 1.0, 1.0]
     products = [walker.leg_length * walker.weight] + [walker.weight] * 3

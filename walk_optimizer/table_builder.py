@@ -1,0 +1,143 @@
+"""Builds the whole table of gaits: every speed and spring mode, then continuation between them.
+
+Each entry is first searched for from scratch, the entries in parallel. Then every entry is continued
+from its neighbours in speed and from the mode with less freedom, until no entry improves: none is
+left that its neighbour leads to a better optimum of.
+"""
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+
+from walk_optimizer.gait import Gait
+from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
+from walk_optimizer.optimizer import Outcome, optimize
+from walk_optimizer.request import GaitRequest, gait_table_settings
+from walk_optimizer.search import SAME_OPTIMUM
+
+# A key of the table: index of the speed, spring mode.
+Key = tuple[int, SpringMode]
+_MODES = tuple(SpringMode)
+_MAXIMUM_SWEEPS = 6
+
+
+@dataclass(frozen=True)
+class TableProgress:
+    """One solve of the table has ended.
+
+    Attributes:
+        stage: `search` or `continuation`.
+        done: Solves that have ended in this stage.
+        total: Solves of this stage.
+        request: What was solved for.
+        outcome: What came of it.
+    """
+
+    stage: str
+    done: int
+    total: int
+    request: GaitRequest
+    outcome: Outcome
+
+
+@dataclass(frozen=True)
+class _Job:
+    key: Key
+    request: GaitRequest
+    walker: WalkerParameters
+    seeds: tuple[Gait, ...]
+    from_scratch: bool
+
+
+def _run(job: _Job) -> Outcome:
+    """Solve one entry, in a process of the pool."""
+    return optimize(job.request, job.walker, seeds=job.seeds, from_scratch=job.from_scratch)
+
+
+def build_table(
+    walker: WalkerParameters,
+    *,
+    processes: int = 2,
+    points: int | None = None,
+    modes: Iterable[SpringMode] = _MODES,
+    on_progress: Callable[[TableProgress], None] | None = None,
+) -> dict[Key, Gait]:
+    """Solve for all gaits of the table.
+
+    Args:
+        walker: The walker.
+        processes: Solves that run at a time.
+        points: Grid points of a step; the settings' by default.
+        modes: Spring modes, each after the ones that it must not be worse than.
+        on_progress: Told after each solve; what it raises ends the build.
+
+    Returns:
+        The gaits by speed index and mode; entries without a certified gait are missing.
+    """
+    steps = gait_table_settings().table_steps()
+    requests = {
+        (index, mode): GaitRequest.for_step(length, time, mode, points)
+        for index, (length, time) in enumerate(steps)
+        for mode in modes
+    }
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        return _Builder(walker, requests, pool, on_progress).build()
+
+
+class _Builder:
+    """The table while it grows."""
+
+    def __init__(
+        self,
+        walker: WalkerParameters,
+        requests: dict[Key, GaitRequest],
+        pool: ProcessPoolExecutor,
+        on_progress: Callable[[TableProgress], None] | None,
+    ) -> None:
+        self.walker, self.requests, self.pool, self.on_progress = walker, requests, pool, on_progress
+        self.table: dict[Key, Gait] = {}
+
+    def build(self) -> dict[Key, Gait]:
+        improved = self._solve([self._job(key, (), from_scratch=True) for key in self.requests], "search")
+        for _ in range(_MAXIMUM_SWEEPS):
+            jobs = [self._continuation(key, improved) for key in self.requests]
+            improved = self._solve([job for job in jobs if job.seeds], "continuation")
+            if not improved:
+                break
+        return self.table
+
+    def _job(self, key: Key, seeds: tuple[Gait, ...], *, from_scratch: bool) -> _Job:
+        return _Job(key, self.requests[key], self.walker, seeds, from_scratch)
+
+    def _continuation(self, key: Key, improved: set[Key]) -> _Job:
+        """Return the job that continues an entry from those of its neighbours that have changed."""
+        index, mode = key
+        neighbours = [(index - 1, mode), (index + 1, mode)]
+        neighbours += [(index, lesser) for lesser in _MODES[: _MODES.index(mode)]]
+        seeds = tuple(self.table[one] for one in neighbours if one in improved)
+        return self._job(key, tuple(_loosened(seed, mode) for seed in seeds), from_scratch=False)
+
+    def _solve(self, jobs: list[_Job], stage: str) -> set[Key]:
+        """Run the jobs, keep what is better, and return the keys of the entries that improved."""
+        improved = set()
+        futures = {self.pool.submit(_run, job): job for job in jobs}
+        for done, future in enumerate(as_completed(futures), start=1):
+            job, outcome = futures[future], future.result()
+            if outcome.gait is not None and self._is_better(job.key, outcome.gait):
+                self.table[job.key] = outcome.gait
+                improved.add(job.key)
+            if self.on_progress is not None:
+                self.on_progress(TableProgress(stage, done, len(jobs), job.request, outcome))
+        return improved
+
+    def _is_better(self, key: Key, gait: Gait) -> bool:
+        known = self.table.get(key)
+        return known is None or gait.objective < known.objective * (1 - SAME_OPTIMUM)
+
+
+def _loosened(seed: Gait, mode: SpringMode) -> Gait:
+    """Return the seed with a spring inside its bounds where a mode with more freedom continues it."""
+    if mode is SpringMode.NONE or seed.spring.stiffness > 0:
+        return seed
+    return replace(seed, spring=KneeSpring(1.0, seed.spring.equilibrium))
