@@ -1,0 +1,91 @@
+"""Publishers whose messages also go into a bag while one is being recorded."""
+
+import os
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+
+from walk_optimizer.recording import Recorder, RecorderSettings, TopicInfo
+from walk_optimizer.recording.errors import RecordingError
+from walk_optimizer.recording.ros_messages import serialize, topic_info
+from walk_optimizer.recording.status import RecorderStatus
+
+
+def new_bag_folder(folder: str) -> Path:
+    """Return the directory of a new bag.
+
+    Args:
+        folder: Where bags go; empty for `$ROS_HOME/walk_optimizer`, by default below `~/.ros`.
+    """
+    home = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros")
+    base = Path(folder).expanduser() if folder else home / "walk_optimizer"
+    return base / f"walk_{datetime.now().astimezone():%Y_%m_%d-%H_%M_%S_%f}"
+
+
+class RecordedTopic:
+    """A publisher and what a bag says about its topic."""
+
+    def __init__(self, node: Node, kind: type, name: str, qos: QoSProfile, bag: "StreamBag") -> None:
+        """Create the publisher and announce it to the bag."""
+        self._publisher: Publisher = node.create_publisher(kind, name, qos)
+        self._bag = bag
+        self.info: TopicInfo = topic_info(self._publisher.topic_name, kind, qos)
+        bag.topics.append(self)
+
+    def publish(self, message: Any, time_ns: int) -> None:
+        """Publish a message, and record the very same bytes.
+
+        Args:
+            message: Of the topic's type.
+            time_ns: When, by the node's clock, in [ns].
+        """
+        recorder = self._bag.recorder
+        if recorder is None:
+            self._publisher.publish(message)
+            return
+        data = serialize(message)
+        self._publisher.publish(data)
+        recorder.write(self.info.name, data, max(time_ns, 0))
+
+
+class StreamBag:
+    """At most one recording at a time of a node's topics.
+
+    Attributes:
+        topics: What is recorded.
+        recorder: The running recording; None when there is none.
+    """
+
+    def __init__(self) -> None:
+        """Record nothing."""
+        self.topics: list[RecordedTopic] = []
+        self.recorder: Recorder | None = None
+
+    def start(self, directory: Path, settings: RecorderSettings) -> None:
+        """Begin a bag.
+
+        Raises:
+            RecordingError: one is being recorded, or the bag can't be created.
+        """
+        if self.recorder is not None and self.recorder.status().recording:
+            raise RecordingError(f"already recording to {self.recorder.directory}; stop that first")
+        recorder = Recorder(directory, settings)
+        for topic in self.topics:
+            recorder.add_topic(topic.info)
+        recorder.start()
+        self.recorder = recorder
+
+    def stop(self) -> RecorderStatus:
+        """Close the bag and return what is in it.
+
+        Raises:
+            RecordingError: nothing is being recorded.
+        """
+        recorder, self.recorder = self.recorder, None
+        if recorder is None:
+            raise RecordingError("nothing is being recorded")
+        return recorder.stop()

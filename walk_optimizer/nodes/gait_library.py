@@ -1,0 +1,136 @@
+"""Node `gait_library`: serves the gait table at once, and asks the optimiser for what it lacks."""
+
+import sys
+from pathlib import Path
+
+from walk_optimizer_interfaces.msg import GaitTable
+from walk_optimizer_interfaces.srv import GetGait, ListGaits, OptimizeGait, Rebuild
+
+from walk_optimizer.errors import GaitNotFoundError, SolveFailedError, WalkOptimizerError
+from walk_optimizer.gait import Gait
+from walk_optimizer.library import GaitLibrary, Selection
+from walk_optimizer.model.parameters import SpringMode
+from walk_optimizer.nodes.conversions import gait_from_message, gait_to_message, summary_to_message
+from walk_optimizer.nodes.parameters import Setting
+from walk_optimizer.nodes.qos import LATCHED
+from walk_optimizer.nodes.running import run_node
+from walk_optimizer.nodes.suite_node import SuiteNode
+from walk_optimizer.nodes.walker_setting import WALKER_FILE, walker_of
+from walk_optimizer.request import GaitRequest, gait_table_settings
+
+OPTIMIZER = "optimizer"
+
+SETTINGS = [
+    WALKER_FILE,
+    Setting(
+        "cache_folder",
+        "",
+        "Existing folder for gaits that were solved on request; empty for the user's cache.",
+        read_only=True,
+    ),
+    Setting(
+        "optimizer_service",
+        "gait_optimizer/optimize_gait",
+        "Service that is asked for gaits that the table lacks.",
+        read_only=True,
+    ),
+    Setting("optimizer_timeout", 900.0, "Longest wait for the optimizer's answer [s].", 1.0, 86_400.0),
+]
+
+
+class GaitLibraryNode(SuiteNode):
+    """Offers `~/get_gait`, `~/list_gaits`, `~/rebuild` and the latched topic `~/table`.
+
+    Does not own how gaits are found and stored (`library.GaitLibrary`).
+    """
+
+    def __init__(self) -> None:
+        """Load the library and offer it."""
+        super().__init__("gait_library", SETTINGS)
+        folder = self.parameters["cache_folder"]
+        walker = walker_of(self.parameters["walker_file"])
+        self._library = GaitLibrary(walker, Path(folder) if folder else None, writable=True)
+        for problem in self._library.problems():
+            self.get_logger().warning(f"gait file set aside: {problem}")
+        self._optimizer = self.connect(OptimizeGait, self.parameters["optimizer_service"])
+        self._table = self.create_publisher(GaitTable, "~/table", LATCHED)
+        self.serve(GetGait, "~/get_gait", self._get)
+        self.serve(ListGaits, "~/list_gaits", self._list)
+        self.serve(Rebuild, "~/rebuild", self._rebuild)
+        self._publish_table()
+        self.get_logger().info(f"ready with {len(self._library.gaits())} gaits")
+
+    async def _get(self, request: GetGait.Request, response: GetGait.Response) -> None:
+        wanted = GaitRequest.for_speed(request.speed, request.spring_mode)
+        gait, response.source = await self._find(wanted, request.selection)
+        response.gait = gait_to_message(gait)
+        response.message = f"{gait.speed:.4f} m/s from the {response.source}"
+
+    async def _find(self, wanted: GaitRequest, selection: str) -> tuple[Gait, str]:
+        """Return a gait and its source, solved now when the library lacks it."""
+        try:
+            gait, source = self._library.find(wanted.speed, wanted.spring_mode, selection)
+        except GaitNotFoundError:
+            if selection == Selection.NEAREST:
+                raise
+            self.get_logger().info(f"asking the optimizer for {wanted.speed:.4f} m/s, {wanted.spring_mode}")
+            return await self._solve(wanted), OPTIMIZER
+        return gait, source.value
+
+    async def _solve(self, wanted: GaitRequest) -> Gait:
+        """Have a gait solved, and store it.
+
+        Raises:
+            WalkOptimizerError: the optimizer refused or is not there, or the gait can't be stored.
+        """
+        request = OptimizeGait.Request(
+            speed=wanted.speed, spring_mode=wanted.spring_mode.value, points=wanted.points
+        )
+        answer = await self.call(self._optimizer, request, self.parameters["optimizer_timeout"])
+        if not answer.success:
+            raise SolveFailedError(answer.message)
+        gait = gait_from_message(answer.gait, answer.report, self._library.walker, wanted)
+        self._library.store(gait)
+        self._publish_table()
+        return gait
+
+    async def _list(self, _request: ListGaits.Request, response: ListGaits.Response) -> None:
+        response.table = self._table_message()
+        response.message = f"{len(response.table.gaits)} gaits"
+
+    async def _rebuild(self, request: Rebuild.Request, response: Rebuild.Response) -> None:
+        speeds = list(request.speeds) or gait_table_settings().table_speeds()
+        modes = request.spring_modes or [mode.value for mode in SpringMode]
+        wanted = [GaitRequest.for_speed(speed, mode) for mode in modes for speed in speeds]
+        failures = [failure for one in wanted if (failure := await self._failure_of(one))]
+        response.rebuilt = len(wanted) - len(failures)
+        response.message = f"{response.rebuilt} of {len(wanted)} gaits solved"
+        if failures:
+            raise SolveFailedError("; ".join([response.message, *failures]))
+
+    async def _failure_of(self, wanted: GaitRequest) -> str:
+        """Solve a gait again, and return why that failed, if it did."""
+        try:
+            await self._solve(wanted)
+        except WalkOptimizerError as error:
+            return f"{wanted.speed:.4f} m/s, {wanted.spring_mode}: {error}"
+        return ""
+
+    def _publish_table(self) -> None:
+        self._table.publish(self._table_message())
+
+    def _table_message(self) -> GaitTable:
+        return GaitTable(
+            stamp=self.get_clock().now().to_msg(),
+            walker=self._library.walker.fingerprint(),
+            gaits=[summary_to_message(summary) for summary in self._library.summaries()],
+        )
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(GaitLibraryNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

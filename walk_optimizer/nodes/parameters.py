@@ -1,0 +1,105 @@
+"""Parameters with descriptions and ranges, validated when set, applied after it."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from walk_optimizer.errors import ConfigurationError, WalkOptimizerError
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One parameter of a node.
+
+    Attributes:
+        name: Of the parameter.
+        default: Value when nobody sets it; its type is the parameter's type.
+        description: What it means, with its unit.
+        low: Least value of a number.
+        high: Largest value of a number.
+        read_only: Whether it can only be set at the start.
+        check: Raises a WalkOptimizerError for a value that is not allowed.
+    """
+
+    name: str
+    default: bool | int | float | str | list[str]
+    description: str
+    low: float | None = None
+    high: float | None = None
+    read_only: bool = False
+    check: Callable[[Any], object] | None = None
+
+    def descriptor(self) -> ParameterDescriptor:
+        """Return what `ros2 param describe` shows."""
+        descriptor = ParameterDescriptor(description=self.description, read_only=self.read_only)
+        if self.low is None or self.high is None:
+            return descriptor
+        if isinstance(self.default, int):
+            bounds = IntegerRange(from_value=int(self.low), to_value=int(self.high), step=1)
+            descriptor.integer_range = [bounds]
+        else:
+            bounds = FloatingPointRange(from_value=float(self.low), to_value=float(self.high), step=0.0)
+            descriptor.floating_point_range = [bounds]
+        return descriptor
+
+    def require(self, value: Any) -> None:
+        """Refuse a value.
+
+        Raises:
+            WalkOptimizerError: it is not finite, or `check` refuses it.
+        """
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ConfigurationError(f"{value} is not finite")
+        if self.check is not None:
+            self.check(value)
+
+
+class NodeParameters:
+    """The parameters of a node: declared, validated together, applied once they are set."""
+
+    def __init__(self, node: Node, settings: Sequence[Setting]) -> None:
+        """Declare the parameters.
+
+        Args:
+            node: That has them.
+            settings: The parameters.
+
+        Raises:
+            ParameterException: a value given at the start is of the wrong type or out of range; the
+                message names the parameter.
+        """
+        self._node = node
+        self._settings = {setting.name: setting for setting in settings}
+        node.add_on_set_parameters_callback(self._validate)
+        for setting in settings:
+            node.declare_parameter(setting.name, setting.default, setting.descriptor())
+
+    def __getitem__(self, name: str) -> Any:
+        """Return the value of a parameter."""
+        return self._node.get_parameter(name).value
+
+    def apply_changes(self, apply: Callable[[set[str]], None]) -> None:
+        """Have a function called with the names of the parameters that were set."""
+        self._node.add_post_set_parameters_callback(
+            lambda parameters: apply({parameter.name for parameter in parameters})
+        )
+
+    def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            setting = self._settings.get(parameter.name)
+            try:
+                if setting is not None:
+                    setting.require(parameter.value)
+            except WalkOptimizerError as error:
+                return SetParametersResult(successful=False, reason=f"{parameter.name}: {error}")
+        return SetParametersResult(successful=True)

@@ -1,0 +1,67 @@
+"""Start and stop a node: Ctrl-C and SIGTERM end it in order, with exit code 0."""
+
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from types import FrameType
+
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from walk_optimizer.errors import WalkOptimizerError
+from walk_optimizer.nodes.suite_node import SuiteNode
+
+# How soon a signal is noticed while nothing else happens, in [s].
+_SIGNAL_PERIOD = 0.1
+
+
+def run_node(make: Callable[[], SuiteNode]) -> int:
+    """Run a node until it is told to stop, and return the exit code."""
+    stop = _stop_on_signals()
+    try:
+        # rclpy's own handlers would take the context away before the bag is closed.
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        node = make()
+    except (WalkOptimizerError, ParameterException, RuntimeError) as error:
+        print(f"can't start: {error}", file=sys.stderr)
+        rclpy.try_shutdown()
+        return 1
+    try:
+        _spin(node, stop)
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+def _stop_on_signals() -> threading.Event:
+    stop = threading.Event()
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        stop.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, note)
+    return stop
+
+
+def _spin(node: SuiteNode, stop: threading.Event) -> None:
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        node.begin()
+        while not stop.is_set():
+            _spin_once(node, executor)
+    finally:
+        node.close()
+        executor.shutdown()
+
+
+def _spin_once(node: SuiteNode, executor: SingleThreadedExecutor) -> None:
+    try:
+        executor.spin_once(timeout_sec=_SIGNAL_PERIOD)
+    except Exception as error:  # noqa: BLE001  # e.g. a client that left before its answer: the node lives on
+        node.get_logger().error(f"callback failed: {error!r}")

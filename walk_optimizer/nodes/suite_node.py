@@ -1,0 +1,133 @@
+"""What the nodes of the suite share: services that refuse politely, and waiting without blocking."""
+
+import concurrent.futures
+import traceback
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.client import Client
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.task import Future
+
+from walk_optimizer.errors import WalkOptimizerError
+from walk_optimizer.nodes.parameters import NodeParameters, Setting
+
+# How often a wait looks whether the other node still lives, in [s].
+_WATCH_PERIOD = 0.1
+
+Answer = Callable[[Any, Any], Awaitable[None]]
+
+
+class ServiceUnavailableError(WalkOptimizerError):
+    """Another node does not offer its service, or did not answer."""
+
+
+class SuiteNode(Node):
+    """A node whose callbacks may await: nothing here ever blocks the executor.
+
+    All callbacks share a re-entrant group, so that others run while one awaits. The executor has one
+    thread: between two awaits a callback is alone.
+    """
+
+    def __init__(self, name: str, settings: Sequence[Setting]) -> None:
+        """Create the node and declare its parameters."""
+        super().__init__(name)
+        self.group = ReentrantCallbackGroup()
+        self.parameters = NodeParameters(self, settings)
+        # Waiting goes by the wall, also in a simulation that stands still.
+        self._wall = Clock(clock_type=ClockType.STEADY_TIME)
+
+    def begin(self) -> None:
+        """Start what needs an executor; called once, before it spins."""
+
+    def close(self) -> None:
+        """Give back what the node holds beside ROS entities; called before it is destroyed."""
+
+    def serve(self, kind: type, name: str, answer: Answer) -> None:
+        """Offer a service whose response has `success` and `message`.
+
+        Args:
+            kind: Service type.
+            name: Of the service.
+            answer: Fills the response; a WalkOptimizerError that it raises is a refusal.
+        """
+
+        async def callback(request: Any, response: Any) -> Any:
+            response.success = False
+            try:
+                await answer(request, response)
+                response.success = True
+            except WalkOptimizerError as error:
+                response.message = str(error)
+                self.get_logger().info(f"{name} refused: {error}")
+            except Exception as error:  # noqa: BLE001  # the client gets an answer, and the node lives on
+                response.message = f"internal error: {error!r}"
+                self.get_logger().error(f"{name} failed: {traceback.format_exc()}")
+            return response
+
+        self.create_service(kind, name, callback, callback_group=self.group)
+
+    def connect(self, kind: type, name: str) -> Client:
+        """Return a client of a service of another node."""
+        return self.create_client(kind, name, callback_group=self.group)
+
+    def later(self, function: Callable[..., Any], *arguments: Any) -> None:
+        """Have a function or coroutine run by the executor; may be called from any thread."""
+        executor = self.executor
+        if executor is not None:
+            executor.create_task(function, *arguments)
+
+    async def finished(self, work: "concurrent.futures.Future[Any]") -> None:
+        """Wait until work of another thread or process is done."""
+        done = Future()
+        work.add_done_callback(lambda _: self.later(done.set_result, None))
+        await done
+
+    async def sleep(self, seconds: float) -> None:
+        """Wait for some time in [s] of the wall clock."""
+        done = Future()
+        timer = self.create_timer(seconds, lambda: done.set_result(None), self.group, self._wall)
+        await done
+        self.destroy_timer(timer)
+
+    async def call(self, client: Client, request: Any, timeout: float) -> Any:
+        """Return the response of another node.
+
+        Args:
+            client: Of the service.
+            request: To send.
+            timeout: Longest wait for the response in [s].
+
+        Raises:
+            ServiceUnavailableError: nobody offers the service, or it went away, or gave no answer.
+        """
+        if not await self._offered(client):
+            raise ServiceUnavailableError(f"service {client.service_name} is not there; is its node running?")
+        future = client.call_async(request)
+        begin = self._wall.now()
+        reasons = []
+
+        def watch() -> None:
+            if not client.service_is_ready():
+                reasons.append("went away")
+            elif (self._wall.now() - begin).nanoseconds * 1e-9 > timeout:
+                reasons.append(f"gave no answer within {timeout:g} s")
+            if reasons:
+                future.cancel()
+
+        timer = self.create_timer(_WATCH_PERIOD, watch, self.group, self._wall)
+        response = await future
+        self.destroy_timer(timer)
+        if response is None:
+            raise ServiceUnavailableError(f"service {client.service_name} {reasons[0]}; ask again")
+        return response
+
+    async def _offered(self, client: Client, patience: float = 3.0) -> bool:
+        """Return whether a service is there, after giving discovery some time in [s]."""
+        for _ in range(round(patience / _WATCH_PERIOD)):
+            if client.service_is_ready():
+                return True
+            await self.sleep(_WATCH_PERIOD)
+        return client.service_is_ready()
