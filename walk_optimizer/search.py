@@ -56,7 +56,7 @@ class Candidate:
     @property
     def mean_effort(self) -> float:
         """Mean of 1/2 |u|^2 over the points in [(N m)^2]: comparable between grids."""
-        return self.objective / self.points.shape[1]
+        return self.objective / float(self.points.shape[1])
 
     @property
     def objective(self) -> float:

@@ -32,6 +32,7 @@ class TableProgress:
         total: Solves of this stage.
         request: What was solved for.
         outcome: What came of it.
+        kept: Whether its gait is now the table's entry.
     """
 
     stage: str
@@ -39,6 +40,7 @@ class TableProgress:
     total: int
     request: GaitRequest
     outcome: Outcome
+    kept: bool
 
 
 @dataclass(frozen=True)
@@ -124,11 +126,12 @@ class _Builder:
         futures = {self.pool.submit(_run, job): job for job in jobs}
         for done, future in enumerate(as_completed(futures), start=1):
             job, outcome = futures[future], future.result()
-            if outcome.gait is not None and self._is_better(job.key, outcome.gait):
+            kept = outcome.gait is not None and self._is_better(job.key, outcome.gait)
+            if kept and outcome.gait is not None:
                 self.table[job.key] = outcome.gait
                 improved.add(job.key)
             if self.on_progress is not None:
-                self.on_progress(TableProgress(stage, done, len(jobs), job.request, outcome))
+                self.on_progress(TableProgress(stage, done, len(jobs), job.request, outcome, kept))
         return improved
 
     def _is_better(self, key: Key, gait: Gait) -> bool:
