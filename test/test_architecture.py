@@ -1,0 +1,109 @@
+"""Imports run downwards only: what a module may import stands above it in this list."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import walk_optimizer
+
+ROOT = Path(walk_optimizer.__file__).parent
+
+# Each line is a layer: its modules may import each other and the layers above, nothing below.
+LAYERS = (
+    ("errors", "__init__"),
+    ("resources",),
+    ("model",),
+    ("request",),
+    ("contact",),
+    ("transcription",),
+    ("guess", "starts"),
+    ("solve",),
+    ("gait",),
+    ("certificate",),
+    ("search", "optimizer", "table_builder"),
+    ("gait_files", "gait_csv"),
+    ("library_entries", "library", "verification", "report_table"),
+    ("profile", "references", "reference_check", "background"),
+    ("figures", "reproduction"),
+    ("recording",),
+    ("nodes", "cli"),
+)
+RANK = {module: rank for rank, layer in enumerate(LAYERS) for module in layer}
+
+
+def top(module: str) -> str:
+    """Return the folder or file of the package that a dotted module name lies in."""
+    parts = module.split(".")
+    return parts[1] if len(parts) > 1 else "__init__"
+
+
+def imports_of(path: Path) -> set[str]:
+    """Return the dotted names that a file imports, those for type checkers included."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+FILES = sorted(ROOT.rglob("*.py"))
+
+
+def own_top(path: Path) -> str:
+    first = path.relative_to(ROOT).parts[0]
+    return first.removesuffix(".py")
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_run_downwards(path):
+    own = own_top(path)
+    assert own in RANK, f"{own} has no layer in this test"
+    for name in imports_of(path):
+        if name.split(".")[0] == "walk_optimizer":
+            other = top(name)
+            if other in RANK:
+                assert RANK[other] <= RANK[own], f"{path} imports {name}, which stands below it"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_only_the_nodes_know_ros(path):
+    ros = {"rclpy", "std_msgs", "sensor_msgs", "trajectory_msgs", "walk_optimizer_interfaces", "launch"}
+    allowed = own_top(path) in {"nodes", "recording"} or path == ROOT / "cli" / "demo.py"
+    if not allowed:
+        assert not {name.split(".")[0] for name in imports_of(path)} & ros
+
+
+CORE = [own_top(path) for path in FILES if path.parent == ROOT] + [
+    "model",
+    "contact",
+    "transcription",
+    "solve",
+]
+
+
+def test_the_core_works_without_ros_and_matplotlib():
+    code = (
+        "import sys, importlib\n"
+        "for name in ('rclpy', 'std_msgs', 'sensor_msgs', 'matplotlib', 'walk_optimizer_interfaces'):\n"
+        "    sys.modules[name] = None\n"
+        f"for name in {sorted(set(CORE) - {'__init__'})!r}:\n"
+        "    importlib.import_module('walk_optimizer.' + name)\n"
+        "import walk_optimizer.figures, walk_optimizer.recording, walk_optimizer.cli.main\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_importing_the_package_is_quick():
+    import time
+
+    times = []
+    for _ in range(3):
+        begin = time.monotonic()
+        subprocess.run([sys.executable, "-c", "import walk_optimizer"], check=True)
+        times.append(time.monotonic() - begin)
+    assert min(times) < 0.5
