@@ -130,7 +130,8 @@ class Search:
         return replace(solved, points=self._with_slip_speeds(solved.points))
 
     def _solve(self, problem: Problem, guess: Candidate, stage: str, *, warm: bool) -> Candidate:
-        unit = torque_unit(self.walker) ** 2 * guess.points.shape[1]
+        # The scaled objective is the integral of 1/2 |u|^2, F its sum over the grid points.
+        unit = torque_unit(self.walker) ** 2 * guess.points.shape[1] / self.request.step_time
         start = to_scaled(self.walker, guess.points, guess.spring)
         solution = self.session.solve(problem, start, stage, objective_unit=unit, warm=warm)
         points, spring = from_scaled(self.walker, solution.x)

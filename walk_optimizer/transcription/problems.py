@@ -10,7 +10,8 @@ from walk_optimizer.model.kinematics import KNEE_1, KNEE_2, UPPER_1, UPPER_2
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.transcription import layout
-from walk_optimizer.transcription.assembly import assemble
+from walk_optimizer.transcription.chain import Stage, assemble
+from walk_optimizer.transcription.euler_stage import euler_kind
 from walk_optimizer.transcription.program import Nlp, Problem
 from walk_optimizer.transcription.scaling import point_units, spring_units
 
@@ -37,7 +38,9 @@ def from_scaled(walker: WalkerParameters, x: FloatArray) -> tuple[FloatArray, Kn
 
 @lru_cache(maxsize=16)
 def _assembled(rows: bytes, points: int) -> Nlp:
-    return assemble(np.frombuffer(rows, dtype=bool).reshape(layout.ROW_WIDTH, points))
+    kept = np.frombuffer(rows, dtype=bool).reshape(layout.ROW_WIDTH, points)
+    stages = [Stage(euler_kind(), (0, 1), kept[:, point]) for point in range(points)]
+    return assemble(stages, layout.SPRING_WIDTH, np.zeros((0, layout.SPRING_WIDTH)))
 
 
 def _variable_bounds(request: GaitRequest, walker: WalkerParameters) -> tuple[FloatArray, FloatArray]:
@@ -78,10 +81,11 @@ class _Bounds:
         rows = np.isfinite(self.lower_rows) | np.isfinite(self.upper_rows)
         low, high = _spring_bounds(self.request.spring_mode, self.walker)
         kept = rows.ravel(order="F")
+        intervals = np.full(self.request.points, self.request.interval)
         step_length = self.request.step_length / self.walker.leg_length
         return Problem(
             nlp=_assembled(rows.tobytes(), self.request.points),
-            parameters=np.array([*self.walker.vector(), self.request.interval]),
+            parameters=np.concatenate([self.walker.vector(), intervals]),
             lower_x=to_scaled(self.walker, self.lower, low),
             upper_x=to_scaled(self.walker, self.upper, high),
             lower_g=np.append(self.lower_rows.ravel(order="F")[kept], step_length),
