@@ -20,8 +20,17 @@ from walk_optimizer.request import GaitRequest, gait_table_settings
 
 OPTIMIZER = "optimizer"
 
+_TABLE = gait_table_settings()
+
 SETTINGS = [
     WALKER_FILE,
+    Setting(
+        "points",
+        _TABLE.points,
+        "Grid points N of the gaits that the optimizer is asked for [-].",
+        _TABLE.minimum_points,
+        _TABLE.maximum_points,
+    ),
     Setting(
         "cache_folder",
         "",
@@ -61,10 +70,13 @@ class GaitLibraryNode(SuiteNode):
         self.get_logger().info(f"ready with {len(self._library.gaits())} gaits")
 
     async def _get(self, request: GetGait.Request, response: GetGait.Response) -> None:
-        wanted = GaitRequest.for_speed(request.speed, request.spring_mode)
+        wanted = self._wanted(request.speed, request.spring_mode)
         gait, response.source = await self._find(wanted, request.selection)
         response.gait = gait_to_message(gait)
         response.message = f"{gait.speed:.4f} m/s from the {response.source}"
+
+    def _wanted(self, speed: float, mode: str) -> GaitRequest:
+        return GaitRequest.for_speed(speed, mode, self.parameters["points"])
 
     async def _find(self, wanted: GaitRequest, selection: str) -> tuple[Gait, str]:
         """Return a gait and its source, solved now when the library lacks it."""
@@ -99,9 +111,9 @@ class GaitLibraryNode(SuiteNode):
         response.message = f"{len(response.table.gaits)} gaits"
 
     async def _rebuild(self, request: Rebuild.Request, response: Rebuild.Response) -> None:
-        speeds = list(request.speeds) or gait_table_settings().table_speeds()
+        speeds = list(request.speeds) or _TABLE.table_speeds()
         modes = request.spring_modes or [mode.value for mode in SpringMode]
-        wanted = [GaitRequest.for_speed(speed, mode) for mode in modes for speed in speeds]
+        wanted = [self._wanted(speed, mode) for mode in modes for speed in speeds]
         failures = [failure for one in wanted if (failure := await self._failure_of(one))]
         response.rebuilt = len(wanted) - len(failures)
         response.message = f"{response.rebuilt} of {len(wanted)} gaits solved"
