@@ -82,7 +82,7 @@ class GaitLibrary:
         for path, source in _gait_files(self.walker, self.folder):
             try:
                 _keep_better(entries, _read_entry(path, source, self.walker))
-            except GaitFileError as error:  # noqa: PERF203 - one bad file must not stop the rest
+            except GaitFileError as error:
                 problems.append(str(error))
         # Replaced as a whole, never changed: another thread that looks a gait up sees the old or the new.
         self._entries = tuple(sorted(entries.values(), key=table_order))

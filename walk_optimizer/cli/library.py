@@ -4,6 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from walk_optimizer.cli import library_build
 from walk_optimizer.cli.arguments import Subparsers, add_library, add_verb, add_walker, walker_from
 
 _TEXT = """\
@@ -28,6 +29,7 @@ F% relates F to the gait without springs at the same speed and number of points.
 def add_parser(verbs: Subparsers) -> None:
     """Add the verb with its actions."""
     actions = add_verb(verbs, "library", _TEXT).add_subparsers(metavar="ACTION", required=True)
+    library_build.add_parser(actions)
     verify = add_verb(actions, "verify", _VERIFY, "example:\n  walk-optimizer library verify")
     verify.add_argument("--folder", type=Path, help="gait files (default: those that ship with the package)")
     add_walker(verify)
