@@ -1,5 +1,6 @@
 """The console script does what its help says, in processes of its own."""
 
+import os
 import signal
 import subprocess
 import time
@@ -57,7 +58,7 @@ def test_the_parser_loads_nothing_heavy():
     assert done.stdout == "[]\n"
 
 
-def test_solve_prints_stores_and_exports(tmp_path):
+def test_solve_prints_stores_and_exports(tmp_path, compiled):
     csv = tmp_path / "gait.csv"
     arguments = ["solve", "--speed", "1.0km/h", "--points", "40", "--save", "--export", csv]
     done = walk_optimizer(*arguments, home=tmp_path)
@@ -75,14 +76,14 @@ def test_solve_prints_stores_and_exports(tmp_path):
     assert again.stdout == csv.read_text()
 
 
-def test_a_time_limit_is_a_status_and_nothing_is_stored(tmp_path):
+def test_a_time_limit_is_a_status_and_nothing_is_stored(tmp_path, compiled):
     done = walk_optimizer("solve", "--speed", OFF_TABLE, "--time-limit", "0.001", "--save", home=tmp_path)
     assert done.returncode == 1
     assert "status         time_limit: stopped at the time limit" in done.stdout
     assert list(tmp_path.rglob("*.npz")) == []
 
 
-def test_interrupt_ends_a_solve_with_130(tmp_path):
+def test_interrupt_ends_a_solve_with_130(tmp_path, compiled):
     arguments = ["solve", "--speed", OFF_TABLE, "--points", "2000", "--save"]
     with subprocess.Popen(
         command(*arguments),
@@ -101,6 +102,30 @@ def test_interrupt_ends_a_solve_with_130(tmp_path):
     assert "Traceback" not in error
     assert time.monotonic() - begin < 5
     assert list(tmp_path.rglob("*.npz")) == []
+
+
+def test_interrupt_ends_a_build_and_keeps_what_it_found(tmp_path, compiled):
+    folder = tmp_path / "table"
+    folder.mkdir()
+    with subprocess.Popen(
+        command("library", "build", "--points", "20", "--jobs", "2", "--output", folder),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(tmp_path),
+        start_new_session=True,
+    ) as process:
+        line = process.stderr.readline()
+        begin = time.monotonic()
+        # To all processes of the group, as a terminal does it.
+        os.killpg(process.pid, signal.SIGINT)
+        _, error = process.communicate(timeout=60)
+    assert line.startswith("search 1/21  ")
+    assert line.endswith(", stored\n")
+    assert time.monotonic() - begin < 10
+    assert process.returncode == 130
+    assert error.splitlines()[-1] == "walk-optimizer: interrupted"
+    assert walk_optimizer("library", "verify", "--folder", folder, home=tmp_path).returncode == 0
 
 
 def test_a_closed_pipe_is_no_error(tmp_path):
@@ -176,7 +201,7 @@ def test_picture_is_drawn_and_the_same_each_time(tmp_path, cached, ending):
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
-def test_what_the_library_lacks_is_solved(tmp_path, cached):
+def test_what_the_library_lacks_is_solved(tmp_path, cached, compiled):
     done = walk_optimizer("export", "--speed", OFF_TABLE, "--points", "30", home=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "no gait of 0.2800 m/s (1.01 km/h) with springs none" in done.stderr

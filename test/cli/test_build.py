@@ -1,0 +1,71 @@
+"""What a build of the table stores and shows."""
+
+from dataclasses import replace
+
+import pytest
+from library.made_up_gait import made_up_gait
+
+from walk_optimizer.certificate import certify
+from walk_optimizer.cli.library_build import bar_text, minutes, solve_text, store_better
+from walk_optimizer.gait_files import read_gait_file
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.optimizer import Outcome, optimize
+from walk_optimizer.request import GaitRequest
+from walk_optimizer.solve.status import SolveReport, Status
+from walk_optimizer.table_builder import TableProgress
+
+REQUEST = GaitRequest.for_speed(0.25 / 0.785, "stiffness", 20)
+
+
+@pytest.fixture(scope="module")
+def solved():
+    return optimize(REQUEST, WalkerParameters()).gait
+
+
+def worse(gait):
+    """Return a gait that is certified but has a larger F: the torques that the model ignores grow."""
+    trajectory = replace(gait.trajectory, u=gait.trajectory.u * 1.0000001)
+    certificate = certify(gait.walker, gait.request, gait.spring, trajectory)
+    assert certificate.certified
+    return replace(gait, trajectory=trajectory, certificate=certificate)
+
+
+def test_a_build_never_makes_the_table_worse(tmp_path, solved):
+    assert store_better(worse(solved), tmp_path)
+    assert store_better(solved, tmp_path)
+    assert not store_better(worse(solved), tmp_path)
+    (path,) = tmp_path.iterdir()
+    assert read_gait_file(path).gait.objective == solved.objective
+
+
+def test_a_file_that_fails_its_certificate_is_replaced_whatever_its_objective(tmp_path, solved):
+    idle = replace(solved, trajectory=replace(solved.trajectory, u=0 * solved.trajectory.u))
+    assert store_better(idle, tmp_path)
+    assert store_better(solved, tmp_path)
+    (path,) = tmp_path.iterdir()
+    path.write_bytes(b"torn")
+    assert store_better(solved, tmp_path)
+
+
+def progress(gait, report):
+    return TableProgress("search", 3, 21, REQUEST, Outcome(gait, report), kept=gait is not None)
+
+
+def test_each_solve_has_its_line():
+    gait = made_up_gait(mode="stiffness")
+    report = replace(gait.report, objective=12.5)
+    assert solve_text(progress(gait, report), stored=True) == (
+        "search 3/21  1.15 km/h stiffness: F 12.5, 1.2 s, stored"
+    )
+    assert solve_text(progress(gait, report), stored=False).endswith(", no better")
+    failed = SolveReport(Status.INFEASIBLE, "no gait; worst is dynamics: 3 N", "ipopt", solve_time=2.0)
+    assert solve_text(progress(None, failed), stored=False) == (
+        "search 3/21  1.15 km/h stiffness: no gait; worst is dynamics: 3 N, 2.0 s, FAILED"
+    )
+
+
+def test_the_bar_estimates_the_time_that_is_left():
+    assert bar_text("search", 7, 21, 70.0) == (
+        "[##########....................] 7/21 search, 1:10 min, about 2:20 min left of this stage"
+    )
+    assert (minutes(0.2), minutes(59.6), minutes(3599.9)) == ("0:00 min", "1:00 min", "60:00 min")
