@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 
-from walk_optimizer.model.kinematics import KNEE_1, KNEE_2, foot_position, mass_positions
+from walk_optimizer.model.kinematics import KNEE_1, KNEE_2, LEGS, foot_position, mass_positions
 from walk_optimizer.model.symbolic import SymbolicWalker
 
 # u1 acts between the upper legs, u2 and u3 on the knees (report eq. 4).
@@ -28,13 +28,36 @@ def potential_energy(walker: SymbolicWalker, q: ca.SX, spring: ca.SX) -> ca.SX:
 
 
 def kinetic_energy(walker: SymbolicWalker, q: ca.SX, velocity: ca.SX) -> ca.SX:
-    """Return T_co(q, qdot) = 1/2 qdot' M(q) qdot in [J]."""
-    return ca.bilin(mass_matrix(walker, q), velocity, velocity) / 2
+    """Return T_co(q, qdot) in [J], the sum over the masses of 1/2 m |J_S qdot|^2 (report eq. 2)."""
+    return sum(
+        mass / 2 * ca.sumsqr(ca.jtimes(position, q, velocity)) for mass, position in mass_positions(walker, q)
+    )
 
 
 def velocity(walker: SymbolicWalker, q: ca.SX, p: ca.SX) -> ca.SX:
-    """Return qdot = dH/dp = M(q)^-1 p."""
-    return ca.solve(mass_matrix(walker, q), p)
+    """Return qdot = dH/dp = M(q)^-1 p.
+
+    The legs couple only through the hip, M = [A B_1 B_2; B_1' C_1 0; B_2' 0 C_2] in blocks of two, so
+    the legs are eliminated first: the code and its derivatives are a fraction of a dense solve's.
+    """
+    matrix = mass_matrix(walker, q)
+    hip, legs = slice(0, 2), [slice(leg[0], leg[1] + 1) for leg in LEGS]
+    coupled = [ca.mtimes(matrix[hip, leg], _inverse_2x2(matrix[leg, leg])) for leg in legs]
+    reduced = matrix[hip, hip] - sum(ca.mtimes(one, matrix[hip, leg].T) for one, leg in zip(coupled, legs, strict=True))
+    load = p[hip] - sum(ca.mtimes(one, p[leg]) for one, leg in zip(coupled, legs, strict=True))
+    hip_velocity = ca.mtimes(_inverse_2x2(reduced), load)
+    leg_velocities = [
+        ca.mtimes(_inverse_2x2(matrix[leg, leg]), p[leg] - ca.mtimes(matrix[hip, leg].T, hip_velocity))
+        for leg in legs
+    ]
+    return ca.vertcat(hip_velocity, *leg_velocities)
+
+
+def _inverse_2x2(matrix: ca.SX) -> ca.SX:
+    """Return the inverse of a symmetric 2 by 2 matrix."""
+    a, b, d = matrix[0, 0], matrix[0, 1], matrix[1, 1]
+    determinant = a * d - b * b
+    return ca.blockcat([[d, -b], [-b, a]]) / determinant
 
 
 def generalized_force(walker: SymbolicWalker, q: ca.SX, qdot: ca.SX, spring: ca.SX) -> ca.SX:

@@ -17,6 +17,8 @@ _LOGGER = logging.getLogger(__name__)
 # -O2 takes half as long again to compile and runs no faster on this straight-line code.
 _COMPILER_FLAGS = ("-O1", "-fPIC", "-shared")
 COMPILER_VARIABLE = "WALK_OPTIMIZER_CC"
+# Functions whose names end so are only asked for their sparsity, and need no machine code.
+PATTERN = "_pattern"
 
 
 def cache_folder() -> Path:
@@ -33,15 +35,16 @@ def compiled(build: Callable[[], list[ca.Function]]) -> dict[str, ca.Function]:
     interpreter: slower, with the same results.
     """
     functions = {function.name(): function for function in build()}
+    evaluated = {name: function for name, function in functions.items() if not name.endswith(PATTERN)}
     compiler = shutil.which(os.environ.get(COMPILER_VARIABLE, "cc") or "no-compiler")
     if compiler is None:
         return functions
     try:
-        library = _shared_library(functions, compiler)
+        library = _shared_library(evaluated, compiler)
     except (OSError, subprocess.CalledProcessError) as error:
         _LOGGER.warning("C code can't be compiled (%s); CasADi's slower interpreter is used", error)
         return functions
-    return {name: ca.external(name, str(library)) for name in functions}
+    return functions | {name: ca.external(name, str(library)) for name in evaluated}
 
 
 def _shared_library(functions: dict[str, ca.Function], compiler: str) -> Path:
