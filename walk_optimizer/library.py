@@ -15,7 +15,7 @@ from walk_optimizer.gait_files import SUFFIX, GaitFile, gait_file_name, read_gai
 from walk_optimizer.gait_files.access import writable_folder
 from walk_optimizer.library_entries import GaitSummary, LibraryEntry, Source, summarize, table_order
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
-from walk_optimizer.request import KMH_PER_MS, TABLE_SPEED_TOLERANCE, gait_table_settings
+from walk_optimizer.request import KMH_PER_MS, TABLE_SPEED_TOLERANCE, GaitRequest, gait_table_settings
 from walk_optimizer.resources import data_folder
 
 __all__ = [
@@ -105,17 +105,22 @@ class GaitLibrary:
         return summarize(self._entries)
 
     def find(
-        self, speed: float, mode: SpringMode | str, selection: Selection | str = Selection.EXACT
+        self,
+        speed: float,
+        mode: SpringMode | str,
+        selection: Selection | str = Selection.EXACT,
+        points: int | None = None,
     ) -> tuple[Gait, Source]:
         """Return the gait for a speed and where it comes from.
 
-        Of several gaits of a speed, the one with the default number of points goes first, then the
-        one of least F.
+        Of several gaits within `TABLE_SPEED_TOLERANCE` of each other, those with the default number
+        of points go first, then the one closest in speed, then the one of least F.
 
         Args:
             speed: In [m/s].
             mode: A spring mode or its name.
             selection: `exact` takes a gait within `TABLE_SPEED_TOLERANCE`, `nearest` the closest.
+            points: Only gaits with this N; None takes any.
 
         Raises:
             InvalidRequestError: the speed is not finite, or the mode or selection unknown.
@@ -124,12 +129,13 @@ class GaitLibrary:
         mode, choice = SpringMode.parse(mode), _parse_selection(selection)
         if not math.isfinite(speed):
             raise InvalidRequestError(f"speed is {speed} m/s, expected a finite number")
-        candidates = [entry for entry in self._entries if entry.gait.request.spring_mode is mode]
-        if choice is Selection.EXACT:
-            candidates = [entry for entry in candidates if _distance(entry, speed) <= TABLE_SPEED_TOLERANCE]
-        if not candidates:
-            raise GaitNotFoundError(self._not_found(speed, mode))
-        best = min(candidates, key=lambda entry: _preference(entry, speed))
+        entries = [entry for entry in self._entries if _fits(entry.gait.request, mode, points)]
+        least = min((_distance(entry, speed) for entry in entries), default=math.inf)
+        if not entries or (choice is Selection.EXACT and least > TABLE_SPEED_TOLERANCE):
+            raise GaitNotFoundError(self._not_found(speed, mode, entries))
+        reach = TABLE_SPEED_TOLERANCE if choice is Selection.EXACT else least + TABLE_SPEED_TOLERANCE
+        within = [entry for entry in entries if _distance(entry, speed) <= reach]
+        best = min(within, key=lambda entry: _preference(entry, speed))
         return best.gait, best.source
 
     def store(self, gait: Gait) -> Path:
@@ -156,9 +162,9 @@ class GaitLibrary:
         self._problems = tuple(text for text in self._problems if not text.startswith(f"{path}:"))
         return path
 
-    def _not_found(self, speed: float, mode: SpringMode) -> str:
-        speeds = sorted({e.gait.request.speed for e in self._entries if e.gait.request.spring_mode is mode})
-        listed = ", ".join(f"{speed:.4f} ({speed * KMH_PER_MS:.2f} km/h)" for speed in speeds) or "none"
+    def _not_found(self, speed: float, mode: SpringMode, entries: list[LibraryEntry]) -> str:
+        speeds = sorted({entry.gait.request.speed for entry in entries})
+        listed = ", ".join(f"{one:.4f} ({one * KMH_PER_MS:.2f} km/h)" for one in speeds) or "none"
         set_aside = f"; files set aside: {'; '.join(self._problems)}" if self._problems else ""
         return (
             f"no gait of {speed:.4f} m/s ({speed * KMH_PER_MS:.2f} km/h) with springs {mode.value}; "
@@ -208,9 +214,14 @@ def _distance(entry: LibraryEntry, speed: float) -> float:
     return abs(entry.gait.request.speed - speed)
 
 
-def _preference(entry: LibraryEntry, speed: float) -> tuple[float, bool, float]:
+def _fits(request: GaitRequest, mode: SpringMode, points: int | None) -> bool:
+    """Return whether a gait is of the mode and, where one is asked for, of the number of points."""
+    return request.spring_mode is mode and points in (None, request.points)
+
+
+def _preference(entry: LibraryEntry, speed: float) -> tuple[bool, float, float]:
     """Return the key by which the smallest is the best answer to a request for a speed."""
     request = entry.gait.request
+    # A gait on a coarse grid that lies closer by less than the tolerance is no better answer.
     other_grid = request.points != gait_table_settings().points
-    # A speed typed with two decimals of km/h may lie closer to a neighbour on another grid: rounded.
-    return round(_distance(entry, speed) / TABLE_SPEED_TOLERANCE), other_grid, entry.gait.objective
+    return other_grid, round(_distance(entry, speed), 6), entry.gait.objective

@@ -93,6 +93,26 @@ def test_the_default_grid_goes_first(table, folder):
     assert GaitLibrary(WALKER, folder).find(FAST, "none")[0].request.points == 200
 
 
+def test_a_number_of_points_can_be_asked_for(table, folder):
+    put(folder, points=40)
+    put(folder, points=200)
+    library = GaitLibrary(WALKER, folder)
+    assert library.find(FAST, "none", points=40)[0].request.points == 40
+    with pytest.raises(GaitNotFoundError):
+        library.find(FAST, "none", points=50)
+
+
+def test_within_the_tolerance_the_closest_speed_of_the_default_grid_goes_first(table, folder):
+    put(folder, speed=FAST, points=200, torque=1.0)
+    put(folder, speed=1.15 / 3.6, points=200, torque=2.0)
+    put(folder, speed=1.15 / 3.6 + 1e-5, points=40, torque=0.5)
+    library = GaitLibrary(WALKER, folder)
+    for selection in ("exact", "nearest"):
+        for speed in (FAST, 1.15 / 3.6):
+            found = library.find(speed, "none", selection)[0].request
+            assert (found.speed, found.points) == (pytest.approx(speed, abs=1e-9), 200)
+
+
 def test_of_the_same_request_the_smaller_objective_is_served(table, folder):
     put(table, torque=2.0)
     library = GaitLibrary(WALKER, folder)

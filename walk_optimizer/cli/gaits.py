@@ -43,19 +43,12 @@ def chosen_gait(args: argparse.Namespace) -> Gait:
     if args.speed is None:
         raise InvalidRequestError("say which gait: --speed SPEED [--spring MODE], or --file GAIT")
     request = request_from(args)
+    points = None if args.points is None else request.points
     try:
-        return _from_library(request, walker, args)
+        return GaitLibrary(walker, args.library).find(request.speed, request.spring_mode, points=points)[0]
     except GaitNotFoundError as error:
         print(f"{error}; solving {request_text(request)}", file=sys.stderr)
     outcome = solve(request, walker)
     if outcome.gait is None:
         raise SolveFailedError(f"no gait: {outcome.report.message}")
     return outcome.gait
-
-
-def _from_library(request: GaitRequest, walker: WalkerParameters, args: argparse.Namespace) -> Gait:
-    """Return the library's gait; raise GaitNotFoundError also for another number of points than asked."""
-    gait, _ = GaitLibrary(walker, args.library).find(request.speed, request.spring_mode)
-    if args.points is not None and gait.request.points != request.points:
-        raise GaitNotFoundError(f"the library's gait has N = {gait.request.points}, not {request.points}")
-    return gait
