@@ -1,0 +1,142 @@
+"""Compiled code gives what the interpreter gives, is kept, and is done without when it must be."""
+
+import logging
+import shutil
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from walk_optimizer.transcription.boundary import boundary_functions
+from walk_optimizer.transcription.compilation import COMPILER_VARIABLE, cache_folder, compiled
+from walk_optimizer.transcription.euler_stage import euler_functions
+
+COMPILER = shutil.which("cc")
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+# Without the cache in memory: as a new process would do it.
+compiled_anew = compiled.__wrapped__
+
+
+def tiny():
+    x = ca.SX.sym("x")
+    return [ca.Function("tiny_square", [x], [x**2]), ca.Function("tiny_sine", [x], [ca.sin(x)])]
+
+
+def assert_works(functions):
+    assert float(functions["tiny_square"](3.0)) == 9.0
+    assert float(functions["tiny_sine"](0.5)) == pytest.approx(np.sin(0.5), rel=1e-15)
+
+
+def is_compiled(functions):
+    return all(function.class_name().endswith("External") for function in functions.values())
+
+
+def libraries():
+    return sorted(cache_folder().glob("*.so"))
+
+
+@pytest.fixture(autouse=True)
+def empty_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv(COMPILER_VARIABLE, raising=False)
+
+
+@pytest.fixture
+def compiler(tmp_path, monkeypatch):
+    """Makes a shell script the compiler, which also counts its runs."""
+
+    def install(script):
+        path, runs = tmp_path / "compiler", tmp_path / "runs"
+        path.write_text(f"#!/bin/sh\necho run >> {runs}\n{script}\n")
+        path.chmod(0o755)
+        monkeypatch.setenv(COMPILER_VARIABLE, str(path))
+        return lambda: len(runs.read_text().splitlines()) if runs.exists() else 0
+
+    return install
+
+
+@needs_compiler
+@pytest.mark.parametrize("build", [euler_functions, boundary_functions])
+def test_compiled_functions_equal_the_interpreters(build, monkeypatch):
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    machine_code, generator = compiled(build), np.random.default_rng(4)
+    monkeypatch.setenv(COMPILER_VARIABLE, "")
+    interpreted = compiled_anew(build)
+    assert set(machine_code) == set(interpreted)
+    for name, function in interpreted.items():
+        for _ in range(5):
+            inputs = [generator.uniform(0.5, 1.5, function.size1_in(i)) for i in range(function.n_in())]
+            for ours, theirs in zip(machine_code[name].call(inputs), function.call(inputs), strict=True):
+                np.testing.assert_allclose(np.asarray(ours), np.asarray(theirs), rtol=1e-12, atol=1e-12)
+
+
+@needs_compiler
+def test_what_was_compiled_is_used_the_second_time(compiler):
+    runs = compiler(f'exec {COMPILER} "$@"')
+    first = compiled_anew(tiny)
+    assert is_compiled(first)
+    assert_works(first)
+    second = compiled_anew(tiny)
+    assert is_compiled(second)
+    assert_works(second)
+    assert runs() == 1
+    assert [path.suffix for path in cache_folder().iterdir()] == [".so"], "no scratch is left behind"
+
+
+@needs_compiler
+def test_other_code_is_another_library():
+    compiled_anew(tiny)
+    x = ca.SX.sym("x")
+    cube = compiled_anew(lambda: [ca.Function("tiny_square", [x], [x**3])])
+    assert float(cube["tiny_square"](3.0)) == 27.0
+    assert len(libraries()) == 2
+
+
+def test_the_interpreter_is_used_on_request_and_without_a_compiler(monkeypatch):
+    for name in ("", "no-such-compiler-anywhere"):
+        monkeypatch.setenv(COMPILER_VARIABLE, name)
+        functions = compiled_anew(tiny)
+        assert not is_compiled(functions)
+        assert_works(functions)
+    assert libraries() == []
+
+
+@pytest.mark.parametrize("script", ["echo broken >&2; exit 1", "exit 0"])
+def test_a_compiler_that_makes_nothing_falls_back_with_a_warning(script, compiler, caplog):
+    runs = compiler(script)
+    with caplog.at_level(logging.WARNING):
+        functions = compiled_anew(tiny)
+    assert runs() == 1
+    assert not is_compiled(functions)
+    assert_works(functions)
+    assert "C code can't be compiled" in caplog.text
+    assert "slower interpreter is used" in caplog.text
+    assert libraries() == []
+
+
+@needs_compiler
+def test_a_cache_that_can_not_be_written_falls_back_with_a_warning(tmp_path, monkeypatch, caplog):
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    functions = compiled_anew(tiny)
+    assert not is_compiled(functions)
+    assert_works(functions)
+    assert "C code can't be compiled" in caplog.text
+
+
+@needs_compiler
+@pytest.mark.xfail(reason="a library that can't be loaded stays in the way", raises=RuntimeError, strict=True)
+def test_a_damaged_library_is_made_again():
+    compiled_anew(tiny)
+    for library in libraries():
+        # A new file: the old one stays mapped in this process.
+        damaged = library.with_suffix(".damaged")
+        damaged.write_bytes(library.read_bytes()[:100])
+        damaged.replace(library)
+    assert_works(compiled_anew(tiny))
+
+
+def test_the_cache_is_below_the_users_cache_by_default(monkeypatch, tmp_path):
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert cache_folder() == tmp_path / ".cache" / "walk_optimizer"
