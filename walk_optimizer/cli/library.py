@@ -75,7 +75,7 @@ def run_verify(args: argparse.Namespace) -> int:
 
 def run_list(args: argparse.Namespace) -> int:
     """List the library."""
-    from walk_optimizer.cli.text import aligned, number
+    from walk_optimizer.cli.text import aligned, cost, number
     from walk_optimizer.library import GaitLibrary
     from walk_optimizer.request import KMH_PER_MS
 
@@ -89,7 +89,7 @@ def run_list(args: argparse.Namespace) -> int:
             str(row.points),
             f"{row.stiffness:.2f}",
             f"{row.equilibrium:.3f}",
-            f"{row.objective:.5g}",
+            cost(row.objective),
             number(row.relative_objective, ".1f"),
             row.source.value,
         )

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from walk_optimizer.cli.text import aligned, number
+from walk_optimizer.cli.text import aligned, cost, number
 from walk_optimizer.errors import GaitNotFoundError
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import SpringMode
@@ -23,7 +23,7 @@ def table_text(library: GaitLibrary) -> str:
     nominal = [_objective(library, speed, SpringMode.NONE) for speed in speeds]
     blocks = [
         _block("speed", [("m/s", "km/h", "report"), *_speed_rows(speeds)]),
-        _block("none", [("F",), *((number(value, ".4g"),) for value in nominal)]),
+        _block("none", [("F",), *((cost(value),) for value in nominal)]),
     ]
     for mode in (SpringMode.STIFFNESS, SpringMode.STIFFNESS_AND_EQUILIBRIUM):
         reported = [row.results[mode] for row in TABLE_I]
@@ -62,7 +62,7 @@ def _our_rows(
             continue
         equilibrium = [f"{gait.spring.equilibrium:.3f}"] if free else []
         share = number(100 * gait.objective / reference, ".1f")
-        rows.append((f"{gait.spring.stiffness:.2f}", *equilibrium, f"{gait.objective:.4g}", share))
+        rows.append((f"{gait.spring.stiffness:.2f}", *equilibrium, cost(gait.objective), share))
     return rows
 
 

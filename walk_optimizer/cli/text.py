@@ -90,3 +90,8 @@ def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = ()) -> str:
 def number(value: float, pattern: str) -> str:
     """Return a number, or a dash where there is none."""
     return "-" if math.isnan(value) else format(value, pattern)
+
+
+def cost(value: float) -> str:
+    """Return F with about four digits, written out."""
+    return number(value, ".0f" if value >= 1000 else ".1f")

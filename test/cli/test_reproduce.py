@@ -1,0 +1,75 @@
+"""The report again: every figure is drawn, every sentence comes from the gaits at hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cli.console import walk_optimizer
+from library.made_up_gait import all_modes, made_up_gait
+
+from walk_optimizer.gait_files import GaitFile, gait_file_name, write_gait_file
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.reproduction import count_dents, sparsity
+from walk_optimizer.request import gait_table_settings
+
+WALKER = WalkerParameters()
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A library of a whole made-up table, of so little torque that it is preferred to any other."""
+    place = tmp_path / "gaits"
+    place.mkdir()
+    for mode, torque in zip(all_modes(), (1e-3, 8e-4, 5e-4), strict=True):
+        for speed in gait_table_settings().table_speeds():
+            gait = made_up_gait(speed=speed, mode=mode, points=200, torque=torque)
+            write_gait_file(GaitFile(gait), place / gait_file_name(gait))
+    return place
+
+
+def test_page_and_figures_are_written(tmp_path, folder):
+    output = tmp_path / "report"
+    done = walk_optimizer("reproduce", "--library", folder, "--output", output, home=tmp_path)
+    assert done.returncode == 0, done.stderr
+    page = (output / "reproduction.md").read_text()
+    for number in range(1, 6):
+        assert f"(figure_{number}.png)" in page
+        assert (output / f"figure_{number}.png").stat().st_size > 10_000
+    assert "The rotation of the hip grows with speed" in page
+    assert "from slow to fast, 1, 1, 1, 1, 1, 1, 1 (counted" in page
+    assert "11 of 14 of our F% are at or below" in page
+    assert "Agrees: knee springs also lower the largest torque at the hip" in page
+
+
+def test_a_library_with_a_gap_is_refused(tmp_path, folder):
+    moon = tmp_path / "moon.yaml"
+    moon.write_text("gravity: 1.62\n")
+    arguments = ["--library", folder, "--walker", moon, "--output", tmp_path / "report"]
+    done = walk_optimizer("reproduce", *arguments, home=tmp_path)
+    assert done.returncode == 2
+    assert "no gait of 0.2353 m/s (0.85 km/h) with springs none" in done.stderr
+    assert "for another walker: gravity is 9.81, expected 1.62" in done.stderr
+
+
+def test_sparsity_is_that_of_the_report():
+    points = 20
+    pattern = sparsity(WALKER, points)
+    assert pattern.shape == (20 * points + 1, 23 * points + 2)
+    # Report section 3.3.1: at most 23 + 12 + 2 variables take part in a constraint.
+    assert pattern[:-1].sum(axis=1).max() <= 37
+    # Only the momenta of the knees feel the springs.
+    felt = pattern[:, -2:].any(axis=1).reshape(-1)[: 12 * points].reshape(12, points)
+    assert np.flatnonzero(felt.all(axis=1)).tolist() == [9, 11]
+
+
+@pytest.mark.parametrize(
+    ("bends", "dents"),
+    [((), 0), ((0.4,), 0), ((10,), 1), ((10, 20), 2), ((3, 2, 1), 3)],
+)
+def test_dents_are_counted_where_the_knee_stretches_again(bends, dents):
+    gait = made_up_gait(points=200)
+    q = gait.trajectory.q.copy()
+    phase = np.linspace(0, max(len(bends), 1), 200, endpoint=False)
+    depth = np.array([*bends, 0])[np.minimum(phase.astype(int), len(bends))]
+    q[5] = np.pi - np.radians(depth) * np.sin(np.pi * (phase % 1)) ** 2
+    assert count_dents(replace(gait, trajectory=replace(gait.trajectory, q=q))) == dents
