@@ -182,9 +182,7 @@ def _about_torques(gaits: Mapping[SpringMode, Gait]) -> str:
     hip = {mode: float(np.abs(gait.trajectory.u[0]).max()) for mode, gait in gaits.items()}
     listed = ", ".join(f"{mode.value} {torque:.2f} N m" for mode, torque in hip.items())
     lower = hip[SpringMode.STIFFNESS_AND_EQUILIBRIUM] < hip[SpringMode.NONE]
-    verdict = (
-        "Agrees: springs at the knees also lower" if lower else "Differs: springs at the knees do not lower"
-    )
+    verdict = "Agrees: knee springs also lower" if lower else "Differs: knee springs do not lower"
     return f"{verdict} the largest torque at the hip, which has no spring: {listed}."
 
 
