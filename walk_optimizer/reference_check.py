@@ -13,6 +13,7 @@ FloatArray = NDArray[np.float64]
 # Where an interval begins, rounding decides which velocity and torque hold: both are right, [s].
 _EDGE = 1e-9
 _COARSE_RATE = 1000.0
+_APART = 0.5 / _COARSE_RATE
 
 
 @dataclass(frozen=True)
@@ -50,18 +51,21 @@ class CycleMatcher:
             effort: In [N m], (4,).
         """
         coarse = np.argmin(np.sum((self._cycle.position - position[:, None]) ** 2, axis=0))
-        time = self._refined(float(self._cycle.time[coarse]), position)
-        places = [(time + shift) % self.period for shift in (-_EDGE, 0.0, _EDGE)]
+        middle = float(self._cycle.time[coarse])
+        # From both sides: where the velocity jumps, the search from one side may end on the wrong one.
+        times = [self._refined(middle + shift, position) for shift in (-_APART, 0.0, _APART)]
+        places = {(time + shift) % self.period for time in times for shift in (-_EDGE, 0.0, _EDGE)}
         found = [self._deviation(place, position, velocity, effort) for place in places]
-        return min(found, key=lambda match: match.velocity + match.effort)
+        return min(found, key=lambda match: match.position + match.velocity + match.effort)
 
     def _refined(self, time: float, position: FloatArray) -> float:
         """Return the time of least distance to a position, by Gauss-Newton along the cycle."""
         for _ in range(20):
+            time %= self.period
             reference = cycle_reference(self._profile, time)
             speed = reference.velocity
             step = float(speed @ (position - reference.position)) / max(float(speed @ speed), 1e-12)
-            time = (time + step) % self.period
+            time += step
             if abs(step) < _EDGE / 10:
                 break
         return time

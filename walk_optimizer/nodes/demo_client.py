@@ -27,6 +27,8 @@ from walk_optimizer.references import JOINTS
 from walk_optimizer.request import GaitRequest
 
 _POLL = 0.05
+# ROS tells when we know a service, not when it knows us; until then its answers are lost, [s].
+_SETTLING = 0.5
 
 
 @dataclass(frozen=True)
@@ -112,12 +114,16 @@ class DemoClient:
                 raise ServiceUnavailableError(f"{what} took longer than {timeout:g} s")
             self._executor.spin_once(timeout_sec=_POLL)
 
+    def pause(self, seconds: float) -> None:
+        """Listen for some time in [s]."""
+        end = time.monotonic() + seconds
+        self.wait(lambda: time.monotonic() >= end, seconds + 30.0, "listening")
+
     def listen(self, seconds: float) -> Reception:
         """Return what arrives in some time in [s], compared with the gait that the publisher announced."""
         self.wait(lambda: self._gait is not None and bool(self._references), 30.0, "the first reference")
         self._references.clear()
-        end = time.monotonic() + seconds
-        self.wait(lambda: time.monotonic() >= end, seconds + 30.0, "listening")
+        self.pause(seconds)
         assert self._gait is not None  # noqa: S101  # waited for above
         return compare(self._references, self._gait)
 
@@ -128,6 +134,7 @@ class DemoClient:
         client = self._node.create_client(kind, name)
         try:
             self.wait(client.service_is_ready, 60.0, f"waiting for {name}")
+            self.pause(_SETTLING)
             future = client.call_async(request)
             self.wait(future.done, timeout, name)
         finally:

@@ -1,0 +1,278 @@
+import itertools
+import math
+import signal
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+
+from nodes.conftest import FAST, SLOW
+from nodes.graph import assert_left_cleanly
+from rclpy.parameter import Parameter
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, Float64MultiArray
+from walk_optimizer_interfaces.msg import Gait
+from walk_optimizer_interfaces.srv import GetJointTrajectory, SetGait, StartRecording, StopRecording
+
+from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.nodes.conversions import trajectory_from_message
+from walk_optimizer.nodes.qos import LATCHED
+from walk_optimizer.profile import EulerProfile
+from walk_optimizer.reference_check import CycleMatcher
+from walk_optimizer.references import JOINTS
+from walk_optimizer.request import GaitRequest
+
+pytestmark = pytest.mark.ros
+
+MODE = "stiffness_and_equilibrium"
+NODE = "reference_publisher"
+# A test machine may stall for long; the phase shall then go on with the clock.
+PATIENT = {"longest_gap": 10.0, "rate": 100.0}
+
+
+@pytest.fixture
+def publisher(start, stocked):
+    start("gait_library", **stocked)
+    return start("reference_publisher", **PATIENT)
+
+
+def walk(graph, speed=SLOW):
+    answer = graph.call(SetGait, f"{NODE}/set_gait", speed=speed, spring_mode=MODE)
+    assert answer.success, answer.message
+
+
+def stamp_ns(message):
+    return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+
+
+def matcher_of(gait):
+    return CycleMatcher(EulerProfile(trajectory_from_message(gait), gait.step_length, gait.step_time))
+
+
+def match(matcher, message):
+    values = (np.array(getattr(message, name)) for name in ("position", "velocity", "effort"))
+    return matcher.match(*values)
+
+
+def assert_is_gait(matcher, message):
+    found = match(matcher, message)
+    assert max(found.position, found.velocity, found.effort) < 1e-6
+    return found.time
+
+
+def test_the_stream_is_the_gait_and_velocity_its_derivative_across_the_exchange(graph, publisher):
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
+    gaits = graph.subscribe(Gait, f"{NODE}/gait", LATCHED)
+    walk(graph)
+    # More than a cycle, so both exchanges of the legs are among them.
+    graph.spin_until(lambda: joints and stamp_ns(joints[-1]) - stamp_ns(joints[0]) > 2.5e9, "a cycle")
+    matcher = matcher_of(gaits[0])
+    times = [assert_is_gait(matcher, message) for message in joints]
+    assert all(list(message.name) == list(JOINTS) for message in joints)
+    for (before, t0), (after, t1) in itertools.pairwise(zip(joints, times, strict=True)):
+        elapsed = (stamp_ns(after) - stamp_ns(before)) * 1e-9
+        assert elapsed > 0
+        # The gait moves on with the stamps, so what the gait's own derivative is, the stream's is.
+        difference = (t1 - t0 - elapsed) % matcher.period
+        assert min(difference, matcher.period - difference) < 1e-6
+        limit = np.abs([before.velocity, after.velocity]).max() + 20.0
+        assert np.abs(np.subtract(after.position, before.position)).max() <= limit * elapsed
+
+
+def test_torques_are_those_of_the_joints_in_the_order_that_the_label_tells(graph, publisher):
+    torques = graph.subscribe(Float64MultiArray, f"{NODE}/feedforward_torques")
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
+    walk(graph)
+    graph.spin_until(lambda: len(torques) > 20, "torques")
+    dimension = torques[0].layout.dim[0]
+    assert (dimension.label, dimension.size, dimension.stride) == ("u1,u2,u3", 3, 3)
+    streamed = {tuple(np.array(joint.effort)[[0, 1, 3]]) for joint in joints}
+    assert sum(tuple(torque.data) in streamed for torque in torques) >= len(torques) - 2
+    assert all(joint.effort[0] == -joint.effort[2] for joint in joints)
+    (answer,) = graph.set_parameters(NODE, Parameter("torque_order", value=["u3", "u1", "u2"]))
+    assert answer.successful
+    torques.clear()
+    graph.spin_until(lambda: torques and torques[-1].layout.dim[0].label == "u3,u1,u2", "another order")
+
+
+def test_another_gait_begins_at_a_step_without_a_jump(graph, publisher):
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
+    gaits = graph.subscribe(Gait, f"{NODE}/gait", LATCHED)
+    walk(graph)
+    graph.spin_until(lambda: len(joints) > 10, "references")
+    walk(graph, FAST)
+    graph.spin_until(lambda: len(gaits) == 2, "the other gait")
+    mark = len(joints)
+    step = gaits[1].step_time
+    graph.spin_until(lambda: stamp_ns(joints[-1]) - stamp_ns(joints[mark - 1]) > 2 * step * 1e9, "two steps")
+    assert_is_gait(matcher_of(gaits[0]), joints[0])
+    assert_is_gait(matcher_of(gaits[1]), joints[-1])
+    for before, after in itertools.pairwise(joints):
+        elapsed = (stamp_ns(after) - stamp_ns(before)) * 1e-9
+        fastest = np.abs([before.velocity, after.velocity]).max() + 20.0
+        assert np.abs(np.subtract(after.position, before.position)).max() <= fastest * elapsed
+
+
+def test_bad_target_speeds_are_logged_and_the_walk_goes_on(graph, publisher):
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
+    gaits = graph.subscribe(Gait, f"{NODE}/gait", LATCHED)
+    walk(graph)
+    target = graph.publisher(Float64, f"{NODE}/target_speed")
+    for speed in (math.nan, math.inf, -math.inf, 0.0, -0.5, 99.0):
+        joints.clear()
+        target.publish(Float64(data=speed))
+        graph.spin_until(lambda: len(joints) > 5, "the walk going on")
+    graph.spin_until(lambda: "target speed refused: speed is nan m/s" in publisher.output(), "the log")
+    assert len(gaits) == 1
+    assert_is_gait(matcher_of(gaits[0]), joints[-1])
+    target.publish(Float64(data=FAST))
+    graph.spin_until(lambda: len(gaits) == 2, "the new speed")
+    assert gaits[1].speed == pytest.approx(FAST)
+    assert publisher.exit_code is None
+
+
+def test_refusals_say_what_the_core_says(graph, publisher):
+    early = graph.call(GetJointTrajectory, f"{NODE}/joint_trajectory")
+    assert (early.success, early.message) == (False, "no gait is streamed yet; call set_gait first")
+    with pytest.raises(InvalidRequestError) as refusal:
+        GaitRequest.for_speed(-1.0, MODE)
+    answer = graph.call(SetGait, f"{NODE}/set_gait", speed=-1.0, spring_mode=MODE)
+    assert (answer.success, answer.message) == (False, str(refusal.value))
+    answer = graph.call(SetGait, f"{NODE}/set_gait", speed=SLOW, spring_mode="none")
+    assert (answer.success, "gait_optimizer/optimize_gait is not there" in answer.message) == (False, True)
+    answer = graph.call(StopRecording, f"{NODE}/stop_recording")
+    assert (answer.success, answer.message) == (False, "nothing is being recorded")
+    walk(graph)
+    answer = graph.call(GetJointTrajectory, f"{NODE}/joint_trajectory", rate=-5.0)
+    assert (answer.success, "rate is -5 Hz" in answer.message) == (False, True)
+
+
+def test_the_cycle_is_what_a_trajectory_controller_takes(graph, publisher):
+    gaits = graph.subscribe(Gait, f"{NODE}/gait", LATCHED)
+    walk(graph)
+    graph.spin_until(lambda: gaits, "the gait")
+    trajectory = graph.call(GetJointTrajectory, f"{NODE}/joint_trajectory", rate=50.0).trajectory
+    assert list(trajectory.joint_names) == list(JOINTS)
+    assert (trajectory.header.stamp.sec, trajectory.header.stamp.nanosec) == (0, 0)
+    times = [point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 for point in trajectory.points]
+    assert np.all(np.diff(times) > 0)
+    assert times[-1] == pytest.approx(2 * gaits[0].step_time)
+    assert list(trajectory.points[-1].velocities) == [0.0] * 4
+    np.testing.assert_allclose(trajectory.points[0].positions, trajectory.points[-1].positions, atol=1e-9)
+    matcher = matcher_of(gaits[0])
+    for point in trajectory.points[1:-1]:
+        values = (np.array(values) for values in (point.positions, point.velocities, point.effort))
+        found = matcher.match(*values)
+        assert max(found.position, found.velocity, found.effort) < 1e-6
+
+
+def read_bag(directory):
+    """Return the messages of each topic with an independent reader."""
+    messages = {}
+    with AnyReader([directory], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        for connection, _, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            messages.setdefault(connection.topic, []).append(message)
+    return messages
+
+
+def values(message):
+    return [list(getattr(message, name)) for name in ("name", "position", "velocity", "effort")]
+
+
+def test_the_bag_holds_what_was_streamed(graph, publisher, tmp_path):
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
+    torques = graph.subscribe(Float64MultiArray, f"{NODE}/feedforward_torques")
+    walk(graph)
+    started = graph.call(StartRecording, f"{NODE}/start_recording", directory=str(tmp_path / "bag"))
+    assert (started.success, started.directory) == (True, str(tmp_path / "bag"))
+    again = graph.call(StartRecording, f"{NODE}/start_recording")
+    assert (again.success, "already recording" in again.message) == (False, True)
+    assert graph.get_parameter(NODE, "record").bool_value
+    begin = len(joints)
+    graph.spin_until(lambda: len(joints) > begin + 100, "references")
+    stopped = graph.call(StopRecording, f"{NODE}/stop_recording")
+    assert stopped.success, stopped.message
+    graph.spin_for(0.2)
+
+    bag = read_bag(tmp_path / "bag")
+    recorded = bag[f"/{NODE}/joint_reference"]
+    assert sum(map(len, bag.values())) == stopped.messages
+    assert len(bag[f"/{NODE}/gait"]) == 1
+    by_stamp = {stamp_ns(message): message for message in recorded}
+    first, last = min(by_stamp), max(by_stamp)
+    within = [message for message in joints if first <= stamp_ns(message) <= last]
+    assert len(within) > 100
+    assert len(within) == len(recorded) == len(by_stamp)
+    for message in within:
+        assert values(message) == values(by_stamp[stamp_ns(message)])
+    kept = [list(message.data) for message in bag[f"/{NODE}/feedforward_torques"]]
+    streamed = [list(message.data) for message in torques]
+    offsets = range(len(streamed) - len(kept) + 1)
+    assert any(streamed[offset : offset + len(kept)] == kept for offset in offsets)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_closes_the_bag_and_leaves_cleanly(graph, publisher, tmp_path, number):
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
+    walk(graph)
+    bag = tmp_path / "bags"
+    answers = graph.set_parameters(
+        NODE, Parameter("recording_folder", value=str(bag)), Parameter("record", value=True)
+    )
+    assert all(answer.successful for answer in answers)
+    graph.spin_until(lambda: len(joints) > 50, "references")
+    assert_left_cleanly(publisher, publisher.stop(number))
+    (directory,) = bag.iterdir()
+    assert (directory / "metadata.yaml").is_file()
+    # Everything that a subscriber got since the recording began is in the closed bag.
+    recorded = {stamp_ns(message) for message in read_bag(directory)[f"/{NODE}/joint_reference"]}
+    graph.spin_for(0.2)
+    assert all(stamp_ns(message) in recorded for message in joints if stamp_ns(message) >= min(recorded))
+
+
+def test_parameters_are_validated_and_applied_while_running(graph, publisher):
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
+    walk(graph)
+    for name, value in (
+        ("rate", 0.0),
+        ("rate", 1e6),
+        ("rate", math.nan),
+        ("rate", "fast"),
+        ("torque_order", ["u1", "u1", "u2"]),
+        ("spring_mode", "rubber"),
+        ("recording_compression", "zip"),
+        ("library_service", "elsewhere"),
+    ):
+        (answer,) = graph.set_parameters(NODE, Parameter(name, value=value))
+        assert not answer.successful, name
+        assert any(words in answer.reason for words in (name, "read-only", "Wrong parameter type"))
+    assert graph.get_parameter(NODE, "rate").double_value == 100.0
+    graph.set_parameters(NODE, Parameter("frame_id", value="hip"), Parameter("rate", value=200.0))
+    graph.spin_until(lambda: joints and joints[-1].header.frame_id == "hip", "the new frame")
+    graph.set_parameters(NODE, Parameter("streaming", value=False))
+    graph.spin_for(0.5)
+    joints.clear()
+    graph.spin_for(0.5)
+    assert not joints
+    graph.set_parameters(NODE, Parameter("streaming", value=True))
+    graph.spin_until(lambda: joints, "the stream going on")
+
+
+def test_a_bad_parameter_stops_the_start(start):
+    for name, value in (("rate", 5000.0), ("initial_speed", 40.0), ("spring_mode", "rubber")):
+        node = start("reference_publisher", **{name: value})
+        assert node.process.wait(60) == 1
+        assert name in node.output()
+        assert "Traceback" not in node.output()
+
+
+def test_it_waits_for_a_library_that_comes_late_also_in_a_namespace(graph, start, stocked):
+    start("reference_publisher", namespace="walker_7", initial_speed=SLOW, **PATIENT)
+    graph.client(SetGait, f"walker_7/{NODE}/set_gait")
+    joints = graph.subscribe(JointState, f"walker_7/{NODE}/joint_reference")
+    start("gait_library", namespace="walker_7", **stocked)
+    graph.spin_until(lambda: len(joints) > 3, "the walk")
