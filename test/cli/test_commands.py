@@ -1,9 +1,11 @@
 """The console script does what its help says, in processes of its own."""
 
 import os
+import re
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -237,3 +239,17 @@ def test_table_shows_the_report_beside_ours(tmp_path):
     assert slow[0] == ["0.2353", "0.85", "0.84"]
     assert slow[3] == ["7.98", "93"]
     assert slow[5] == ["8.00", "3.09", "64"]
+
+
+def test_the_readme_shows_the_table_that_ships(tmp_path):
+    printed = walk_optimizer("table", "--format", "markdown", home=tmp_path).stdout
+    readme = Path(__file__).parents[2] / "README.md"
+    assert printed in readme.read_text(), "README.md: replace its table by that of `table --format markdown`"
+
+
+def test_the_readme_names_only_verbs_that_exist(tmp_path):
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    named = set(re.findall(r"`walk-optimizer ([a-z]+)", readme))
+    assert named >= {"solve", "table", "export", "picture", "library", "reproduce", "bag"}
+    for verb in sorted(named):
+        assert walk_optimizer(verb, "--help", home=tmp_path).returncode == 0

@@ -16,6 +16,7 @@ A lower F% is better. The report does not give F itself."""
 def add_parser(verbs: Subparsers) -> None:
     """Add the verb."""
     parser = add_verb(verbs, "table", _TEXT)
+    parser.add_argument("--format", choices=["text", "markdown"], default="text", help="default: text")
     add_walker(parser)
     add_library(parser)
     parser.set_defaults(run=run)
@@ -23,11 +24,11 @@ def add_parser(verbs: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the table."""
-    from walk_optimizer.cli.table_text import table_text
+    from walk_optimizer.cli.table_text import markdown_table, table_text
     from walk_optimizer.library import GaitLibrary
 
     library = GaitLibrary(walker_from(args), args.library)
-    print(table_text(library))
+    print(markdown_table(library) if args.format == "markdown" else table_text(library))
     for problem in library.problems():
         print(f"set aside: {problem}", file=sys.stderr)
     return 0

@@ -32,6 +32,31 @@ def table_text(library: GaitLibrary) -> str:
     return "\n".join(" | ".join(line).rstrip() for line in zip(*blocks, strict=True)) + f"\n{_LEGEND}"
 
 
+def markdown_table(library: GaitLibrary) -> str:
+    """Return the table as Markdown; bold where our F% is at or below the report's."""
+    speeds = gait_table_settings().table_speeds()
+    nominal = [_objective(library, speed, SpringMode.NONE) for speed in speeds]
+    columns = [
+        ["km/h", "---", *(f"{speed * KMH_PER_MS:.2f}" for speed in speeds)],
+        ["none: F", "---", *map(cost, nominal)],
+    ]
+    for mode in (SpringMode.STIFFNESS, SpringMode.STIFFNESS_AND_EQUILIBRIUM):
+        reported = [row.results[mode] for row in TABLE_I]
+        head, *ours = _our_rows(library, mode, speeds, nominal)
+        marked = [_marked(row, result) for row, result in zip(ours, reported, strict=True)]
+        columns.append([f"{mode.value}: {', '.join(head)}", "---", *map(", ".join, marked)])
+        head, *theirs = _report_rows(reported)
+        columns.append([f"report: {', '.join(head)}", "---", *map(", ".join, theirs)])
+    return "\n".join(f"| {' | '.join(line)} |" for line in zip(*columns, strict=True))
+
+
+def _marked(row: Sequence[str], reported: ReportResult) -> list[str]:
+    """Return a row whose last entry, F%, is bold when it is at or below the report's."""
+    *rest, share = row
+    better = share != "-" and float(share) <= reported.relative_objective
+    return [*rest, f"**{share}**" if better else share]
+
+
 def _block(title: str, rows: Rows) -> list[str]:
     """Return the lines of a block, equally wide, under its title and a rule."""
     lines = aligned(rows).splitlines()
