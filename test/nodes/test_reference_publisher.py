@@ -7,11 +7,13 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from builtin_interfaces.msg import Time
 from nodes.conftest import FAST, SLOW
 from nodes.graph import assert_left_cleanly
 from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from walk_optimizer_interfaces.msg import Gait
@@ -268,6 +270,43 @@ def test_a_bad_parameter_stops_the_start(start):
         assert node.process.wait(60) == 1
         assert name in node.output()
         assert "Traceback" not in node.output()
+
+
+def test_a_simulated_clock_that_jumps_moves_no_reference(graph, start, stocked):
+    """Time stands still, runs, is reset, leaps and runs again: the walk holds, or goes on from there."""
+    start("gait_library", **stocked)
+    start(NODE, use_sim_time=True, longest_gap=0.1, rate=500.0)
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
+    gaits = graph.subscribe(Gait, f"{NODE}/gait", LATCHED)
+    clock = graph.publisher(Clock, "/clock")
+
+    def run_from(milliseconds):
+        """Let the clock run until the stream has told of it, and return the last stamp in [ms]."""
+        mark = len(joints)
+        for _ in range(2000):
+            milliseconds += 5
+            seconds, rest = divmod(milliseconds, 1000)
+            clock.publish(Clock(clock=Time(sec=seconds, nanosec=rest * 1_000_000)))
+            graph.spin_for(0.005)
+            if len(joints) >= mark + 30:
+                return milliseconds
+        raise AssertionError("no references came with the simulated clock")
+
+    clock.publish(Clock(clock=Time(sec=1000)))
+    walk(graph)
+    last = run_from(1_000_000)
+    graph.spin_for(0.5)
+    held = len(joints)
+    graph.spin_for(0.5)
+    assert len(joints) == held  # Time stands still.
+    run_from(2_000)
+    run_from(last + 3_600_000)
+    stamps = [stamp_ns(message) for message in joints]
+    assert min(stamps) < 3e9 < 4e12 < max(stamps)
+    times = [assert_is_gait(matcher_of(gaits[0]), message) for message in joints]
+    passed = np.diff(times) % (2 * gaits[0].step_time)
+    # Never backwards, and never further than the longest gap, which several lost messages may add up.
+    assert all(step < 1.0 or step > 2 * gaits[0].step_time - 1e-6 for step in passed)
 
 
 def test_it_waits_for_a_library_that_comes_late_also_in_a_namespace(graph, start, stocked):

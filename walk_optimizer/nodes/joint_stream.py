@@ -72,7 +72,7 @@ class JointStream:
         # The generator drops former gaits; their messages go with them.
         self._messages: WeakKeyDictionary[StepProfile, GaitMessage] = WeakKeyDictionary()
         self._announced: StepProfile | None = None
-        self._begin_ns = 0
+        self._begin_ns = self._last_ns = 0
         self._lock = threading.Lock()
         self._pacer = Pacer(1 / rate, self._tick)
 
@@ -144,6 +144,9 @@ class JointStream:
 
     def _publish(self, generator: ReferenceGenerator) -> None:
         now = self._node.get_clock().now()
+        if now.nanoseconds == self._last_ns:
+            return  # A simulation that stands still: nothing new to say.
+        self._last_ns = now.nanoseconds
         # Counted from the begin: a float of the seconds since 1970 resolves a quarter microsecond.
         reference = generator.advance((now.nanoseconds - self._begin_ns) * 1e-9)
         if generator.gait is not self._announced:
