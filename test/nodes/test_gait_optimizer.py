@@ -14,6 +14,7 @@ from walk_optimizer_interfaces.srv import OptimizeGait
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.nodes.conversions import gait_from_message, gait_to_message, request_of_message
+from walk_optimizer.nodes.qos import SERVICE as SERVICE_QOS
 from walk_optimizer.request import GaitRequest
 
 pytestmark = pytest.mark.ros
@@ -147,6 +148,21 @@ def test_a_full_queue_is_answered_politely(graph, own_optimizer):
     answer = graph.call(OptimizeGait, f"own/{SERVICE}", **ENDLESS | {"points": 1997})
     assert not answer.success
     assert answer.message == "busy: 2 solves are waiting, no more than 2 may; ask again later"
+
+
+def test_a_flood_is_answered_to_the_last_request(graph, own_optimizer):
+    Goal(graph, "own/", **ENDLESS).wait_for_progress()
+    graph.client(OptimizeGait, f"own/{SERVICE}")  # Waits until the service is there.
+    client = graph.node.create_client(OptimizeGait, f"own/{SERVICE}", qos_profile=SERVICE_QOS)
+    graph.spin_until(client.service_is_ready, "the service")
+    graph.spin_for(0.5)
+    requests = [OptimizeGait.Request(**ENDLESS | {"points": 999 + number}) for number in range(1000)]
+    answers = [client.call_async(request) for request in requests]
+    # Two wait for the worker; all others are told at once.
+    graph.spin_until(lambda: sum(answer.done() for answer in answers) >= 998, "998 answers")
+    told = [answer.result().message for answer in answers if answer.done()]
+    assert sum(message.startswith("busy: 2 solves are waiting") for message in told) == 998
+    assert own_optimizer.exit_code is None
 
 
 def test_a_time_limit_is_kept(graph, optimizer):

@@ -13,6 +13,7 @@ from rclpy.task import Future
 
 from walk_optimizer.errors import WalkOptimizerError
 from walk_optimizer.nodes.parameters import NodeParameters, Setting
+from walk_optimizer.nodes.qos import SERVICE
 
 # How often a wait looks whether the other node still lives, in [s].
 _WATCH_PERIOD = 0.1
@@ -67,11 +68,11 @@ class SuiteNode(Node):
                 self.get_logger().error(f"{name} failed: {traceback.format_exc()}")
             return response
 
-        self.create_service(kind, name, callback, callback_group=self.group)
+        self.create_service(kind, name, callback, qos_profile=SERVICE, callback_group=self.group)
 
     def connect(self, kind: type, name: str) -> Client:
         """Return a client of a service of another node."""
-        return self.create_client(kind, name, callback_group=self.group)
+        return self.create_client(kind, name, qos_profile=SERVICE, callback_group=self.group)
 
     def later(self, function: Callable[..., Any], *arguments: Any) -> None:
         """Have a function or coroutine run by the executor; may be called from any thread."""

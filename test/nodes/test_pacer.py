@@ -1,0 +1,41 @@
+import threading
+import time
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from walk_optimizer.nodes.pacer import Pacer
+
+PERIOD = 0.002
+
+
+def test_ticks_never_come_in_a_burst_and_what_was_late_is_counted():
+    times, enough = [], threading.Event()
+
+    def tick():
+        times.append(time.monotonic())
+        if len(times) == 20:
+            time.sleep(0.2)  # A stall of a hundred periods.
+        if len(times) == 60:
+            enough.set()
+
+    pacer = Pacer(PERIOD, tick)
+    assert enough.wait(60)
+    pacer.stop()
+    # However late a tick was, those after it keep to the schedule: each begins at its own multiple.
+    for first in range(len(times)):
+        for second in range(first + 1, len(times)):
+            assert times[second] - times[first] > (second - first - 1) * PERIOD - 1e-4
+    assert pacer.missed >= 99
+
+
+def test_stop_waits_for_the_last_tick():
+    ticked = threading.Event()
+    pacer = Pacer(0.001, ticked.set)
+    assert ticked.wait(60)
+    pacer.period = 0.01
+    pacer.stop()
+    ticked.clear()
+    time.sleep(0.05)
+    assert not ticked.is_set()
