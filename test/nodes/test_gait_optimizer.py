@@ -175,11 +175,16 @@ def test_a_time_limit_is_kept(graph, optimizer):
 def test_a_signal_ends_the_node_cleanly_with_its_worker(graph, own_optimizer, number, solving):
     graph.client(OptimizeGait, f"own/{SERVICE}")
     if solving:
-        Goal(graph, "own/", **ENDLESS).wait_for_progress()
+        goal = Goal(graph, "own/", **ENDLESS)
+        goal.wait_for_progress()
+        waiting = graph.send(OptimizeGait, f"own/{SERVICE}", **ENDLESS)
+        graph.spin_for(0.5)
     children = children_of(own_optimizer.process.pid)
     assert children
     assert_left_cleanly(own_optimizer, own_optimizer.stop(number))
     graph.spin_until(lambda: not any(map(exists, children)), "the workers' end")
+    if solving:
+        assert graph.result(waiting).report.status == "cancelled"
 
 
 def test_parameters_out_of_range_or_of_a_wrong_type_stop_the_start(start):

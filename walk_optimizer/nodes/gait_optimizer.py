@@ -78,9 +78,13 @@ class GaitOptimizerNode(SuiteNode):
         self.get_logger().info("ready")
 
     def close(self) -> None:
-        """End the workers."""
+        """End the workers; those who wait are told that their solve was cancelled."""
         self._pool.close()
+
+    def destroy_node(self) -> None:
+        """Give back all ROS entities."""
         self._action.destroy()
+        super().destroy_node()
 
     async def _answer(self, request: OptimizeGait.Request, response: OptimizeGait.Response) -> None:
         await self._fill(response, submit_gait(self._pool, self._job(request)))

@@ -3,6 +3,7 @@
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable
 from types import FrameType
 
@@ -16,6 +17,8 @@ from walk_optimizer.nodes.suite_node import SuiteNode
 
 # How soon a signal is noticed while nothing else happens, in [s].
 _SIGNAL_PERIOD = 0.1
+# How long the node still answers after it was told to stop, in [s].
+_LAST_WORDS = 0.2
 
 
 def run_node(make: Callable[[], SuiteNode]) -> int:
@@ -57,11 +60,19 @@ def _spin(node: SuiteNode, stop: threading.Event) -> None:
             _spin_once(node, executor)
     finally:
         node.close()
+        _answer_the_waiting(node, executor)
         executor.shutdown()
 
 
-def _spin_once(node: SuiteNode, executor: SingleThreadedExecutor) -> None:
+def _answer_the_waiting(node: SuiteNode, executor: SingleThreadedExecutor) -> None:
+    """Let clients have the answers that closing the node has brought about."""
+    end = time.monotonic() + _LAST_WORDS
+    while time.monotonic() < end:
+        _spin_once(node, executor, _LAST_WORDS / 10)
+
+
+def _spin_once(node: SuiteNode, executor: SingleThreadedExecutor, timeout: float = _SIGNAL_PERIOD) -> None:
     try:
-        executor.spin_once(timeout_sec=_SIGNAL_PERIOD)
+        executor.spin_once(timeout_sec=timeout)
     except Exception as error:  # noqa: BLE001  # e.g. a client that left before its answer: the node lives on
         node.get_logger().error(f"callback failed: {error!r}")
