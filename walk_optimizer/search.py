@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.contact.schedule import CONTACT_FAMILIES, Schedule, observed_schedule
+from walk_optimizer.contact.observation import schedule_of, slip_velocities
+from walk_optimizer.contact.schedule import CONTACT_FAMILIES, Schedule
 from walk_optimizer.gait import Gait
 from walk_optimizer.guess import Start, kinematic_guess, resampled
-from walk_optimizer.model.functions import evaluate
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
@@ -28,6 +28,8 @@ FloatArray = NDArray[np.float64]
 
 # Optima whose objectives agree to this relative difference are taken for one.
 SAME_OPTIMUM = 1e-4
+# Barrier parameter for starts that meet the optimality conditions but for their contacts.
+_NEAR = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,43 +118,30 @@ class Search:
         """
         start = replace(best, points=self._with_slip_speeds(best.points))
         problem = complementarity_problem(self.request, self.walker, self.relaxation)
-        relaxed = self._solve(problem, start, "complementarity", warm=True)
-        schedule = self._observed(relaxed)
-        found = self._with_schedule(replace(relaxed, contacts="found"), schedule, "polish", warm=True)
+        relaxed = self._solve(problem, start, "complementarity", barrier=_NEAR)
+        parts = (relaxed.points[rows] for rows in (layout.Q, layout.P, layout.REACTION))
+        schedule = schedule_of(self.walker, *parts)
+        found = self._with_schedule(replace(relaxed, contacts="found"), schedule, "polish", barrier=_NEAR)
         return found if found.solved and found.mean_effort < best.mean_effort * (1 - SAME_OPTIMUM) else start
 
     def _with_schedule(
-        self, guess: Candidate, schedule: Schedule, stage: str, *, warm: bool = False
+        self, guess: Candidate, schedule: Schedule, stage: str, *, barrier: float | None = None
     ) -> Candidate:
         request = replace(self.request, points=schedule.shape[1])
         problem = fixed_schedule_problem(request, self.walker, schedule)
-        solved = self._solve(problem, guess, stage, warm=warm)
+        solved = self._solve(problem, guess, stage, barrier=barrier)
         return replace(solved, points=self._with_slip_speeds(solved.points))
 
-    def _solve(self, problem: Problem, guess: Candidate, stage: str, *, warm: bool) -> Candidate:
+    def _solve(self, problem: Problem, guess: Candidate, stage: str, *, barrier: float | None) -> Candidate:
         # The scaled objective is the integral of 1/2 |u|^2, F its sum over the grid points.
         unit = torque_unit(self.walker) ** 2 * guess.points.shape[1] / self.request.step_time
         start = to_scaled(self.walker, guess.points, guess.spring)
-        solution = self.session.solve(problem, start, stage, objective_unit=unit, warm=warm)
+        solution = self.session.solve(problem, start, stage, objective_unit=unit, barrier=barrier)
         points, spring = from_scaled(self.walker, solution.x)
         return replace(guess, points=points, spring=spring, status=solution.status)
-
-    def _slip(self, points: FloatArray) -> FloatArray:
-        """Return the tangential velocity of both feet, (2, N)."""
-        return evaluate("foot_velocities", self.walker, points[layout.Q], points[layout.P])[:, 0, :].T
 
     def _with_slip_speeds(self, points: FloatArray) -> FloatArray:
         """Return the points with gamma = |slip|, the least that eqs. (5c) and (5d) allow."""
         completed = points.copy()
-        completed[layout.SLIP] = np.abs(self._slip(points))
+        completed[layout.SLIP] = np.abs(slip_velocities(self.walker, points[layout.Q], points[layout.P]))
         return completed
-
-    def _observed(self, candidate: Candidate) -> Schedule:
-        """Return the contacts that a solution of the complementarity problem uses."""
-        walker, q = self.walker, candidate.points[layout.Q]
-        forces = candidate.points[layout.REACTION].reshape(2, 3, -1) / walker.weight
-        normal = forces[:, 2]
-        cone_slack = walker.friction_coefficient * normal - forces[:, 0] - forces[:, 1]
-        heights = evaluate("feet", walker, q, np.zeros_like(q))[:, 1, :].T
-        slip = self._slip(candidate.points)
-        return observed_schedule(heights / walker.leg_length, normal, cone_slack, slip)

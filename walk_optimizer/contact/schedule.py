@@ -20,6 +20,8 @@ FloatArray = NDArray[np.float64]
 
 # A foot slower than this sticks, whatever relaxation leaves of its friction cone, in [m/s].
 LEAST_SLIP_SPEED = 1e-4
+# A foot with less load than this part of the weight grazes the ground and is free.
+LEAST_LOAD = 1e-7
 
 
 def single_impact(points: int) -> Schedule:
@@ -58,7 +60,7 @@ def observed_schedule(
         cone_slack: mu lambda_y - lambda_x+ - lambda_x- in units of weight, (2, N).
         slip: Tangential velocity of both feet in [m/s], (2, N).
     """
-    loaded = normal_force > gap
+    loaded = normal_force > np.maximum(gap, LEAST_LOAD)
     slipping = loaded & (np.abs(slip) > np.maximum(cone_slack, LEAST_SLIP_SPEED))
     schedule = np.where(loaded, FootMode.STICK, FootMode.FREE).astype(np.int8)
     schedule[slipping & (slip > 0)] = FootMode.SLIP_FORWARD

@@ -29,12 +29,13 @@ class IpoptOptions:
     Attributes:
         tolerance: Scaled optimality error to reach.
         maximum_iterations: Iteration limit.
-        warm: Whether the start is close to a solution: small barrier, no push off the bounds.
+        barrier: First barrier parameter for a start that is close to a solution, which is then left
+            near its bounds; None for a start that may be far from one.
     """
 
     tolerance: float = 1e-9
     maximum_iterations: int = 500
-    warm: bool = False
+    barrier: float | None = None
 
     def for_ipopt(self) -> dict[str, Any]:
         """Return the options under IPOPT's names."""
@@ -44,9 +45,13 @@ class IpoptOptions:
             "tol": self.tolerance,
             "max_iter": self.maximum_iterations,
             "mu_strategy": "adaptive",
+            # By default every bound is widened by 1e-8, and solutions make use of it.
+            "bound_relax_factor": 0.0,
         }
-        if self.warm:
-            options |= {"mu_strategy": "monotone", "mu_init": 1e-9, "bound_push": 1e-8, "bound_frac": 1e-8}
+        if self.barrier is not None:
+            push = min(1e-6, 10 * self.barrier)
+            options |= {"mu_strategy": "monotone", "mu_init": self.barrier}
+            options |= {"bound_push": push, "bound_frac": push}
         return options
 
 
@@ -59,12 +64,19 @@ class _Watcher(ca.Callback):
         self.monitor: Monitor | None = None
         self.problem: Problem | None = None
         self.verdict: Status | None = None
+        self.error: BaseException | None = None
         self.iteration = 0
         self.construct("watcher", {})
 
     def begin(self, problem: Problem, monitor: Monitor | None) -> None:
-        """Forget the last solve."""
-        self.problem, self.monitor, self.verdict, self.iteration = problem, monitor, None, -1
+        """Watch a new solve."""
+        self.problem, self.monitor, self.verdict, self.error, self.iteration = problem, monitor, None, None, -1
+
+    def end(self) -> None:
+        """Let go of the solve, since its program keeps this watcher alive; raise what the monitor raised."""
+        error, self.problem, self.monitor, self.error = self.error, None, None, None
+        if error is not None:
+            raise error
 
     def get_n_in(self) -> int:
         return int(ca.nlpsol_n_out())
@@ -83,8 +95,11 @@ class _Watcher(ca.Callback):
             return [0]
         x, f, g = (np.asarray(arguments[k]).ravel() for k in range(3))
         state = IterationState(self.iteration, float(f[0]), self.problem.infeasibility(x, g))
-        self.verdict = self.monitor(state)
-        return [0 if self.verdict is None else 1]
+        try:
+            self.verdict = self.monitor(state)
+        except BaseException as error:  # noqa: BLE001  # CasADi would swallow it; `end` raises it again
+            self.error = error
+        return [0 if self.verdict is None and self.error is None else 1]
 
 
 class _Instance:
@@ -126,23 +141,26 @@ def solve(
         problem: The program, scaled.
         start: First iterate, same shape as x.
         options: Of this solve.
-        monitor: Told at each iteration, may stop the solve.
+        monitor: Told at each iteration, may stop the solve; what it raises is raised here.
     """
     if not np.all(np.isfinite(start)):
         return Solution(Status.EVALUATION_ERROR, start, np.nan, np.inf, 0, "the first guess is not finite")
     instance = _instance(problem.nlp, options)
     instance.watcher.begin(problem, monitor)
-    result = instance.solver(
-        x0=start,
-        p=problem.parameters,
-        lbx=problem.lower_x,
-        ubx=problem.upper_x,
-        lbg=problem.lower_g,
-        ubg=problem.upper_g,
-    )
+    try:
+        result = instance.solver(
+            x0=start,
+            p=problem.parameters,
+            lbx=problem.lower_x,
+            ubx=problem.upper_x,
+            lbg=problem.lower_g,
+            ubg=problem.upper_g,
+        )
+    finally:
+        instance.watcher.end()
     statistics = instance.solver.stats()
     detail = statistics["return_status"]
-    status = instance.watcher.verdict or _STATUS.get(detail, Status.EVALUATION_ERROR)
+    status = instance.watcher.verdict or _STATUS.get(detail, Status.SOLVER_ERROR)
     x, g = (np.asarray(result[name]).ravel() for name in ("x", "g"))
     infeasibility, iterations = problem.infeasibility(x, g), statistics["iter_count"]
     return Solution(status, x, float(result["f"]), infeasibility, iterations, detail)

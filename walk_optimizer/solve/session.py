@@ -38,7 +38,13 @@ class SolveSession:
         return self.verdict is not None
 
     def solve(
-        self, problem: Problem, start: FloatArray, stage: str, *, objective_unit: float, warm: bool = False
+        self,
+        problem: Problem,
+        start: FloatArray,
+        stage: str,
+        *,
+        objective_unit: float,
+        barrier: float | None = None,
     ) -> Solution:
         """Solve one program of the session.
 
@@ -47,13 +53,13 @@ class SolveSession:
             start: First iterate.
             stage: Name for the progress.
             objective_unit: What one unit of the scaled objective is, in [(N m)^2].
-            warm: Whether the start is close to a solution.
+            barrier: First barrier parameter for a start that is close to a solution.
         """
 
         def monitor(state: IterationState) -> Status | None:
             return self._watch(state, stage, objective_unit)
 
-        options = ipopt.IpoptOptions(self._settings.tolerance, self._settings.maximum_iterations, warm)
+        options = ipopt.IpoptOptions(self._settings.tolerance, self._settings.maximum_iterations, barrier)
         solution = ipopt.solve(problem, start, options, monitor)
         self.iterations += solution.iterations
         return solution

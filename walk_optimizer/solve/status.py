@@ -15,6 +15,7 @@ class Status(StrEnum):
     CANCELLED = "cancelled"
     ACCEPTABLE_ONLY = "acceptable_only"
     EVALUATION_ERROR = "evaluation_error"
+    SOLVER_ERROR = "solver_error"
     NOT_CERTIFIED = "not_certified"
     WORKER_LOST = "worker_lost"
 
@@ -32,6 +33,7 @@ _SENTENCES = {
     Status.CANCELLED: "cancelled by the caller",
     Status.ACCEPTABLE_ONLY: "met only loose tolerances; that is not counted as solved",
     Status.EVALUATION_ERROR: "the model gave values that are not finite",
+    Status.SOLVER_ERROR: "the solver gave up for a reason of its own",
     Status.NOT_CERTIFIED: "converged, but the independent certificate found a violation",
     Status.WORKER_LOST: "the worker process ended before it answered; ask again",
 }

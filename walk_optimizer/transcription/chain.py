@@ -105,7 +105,7 @@ class _Group:
         self.kind, self.members = kind, members
         shared = np.array([graph.stages[i].shared for i in members], dtype=np.int64).T
         own = graph.column_offset[members] + np.arange(kind.width)[:, None]
-        self.columns = np.vstack([own, graph.shared_offset + shared.reshape(kind.shared, -1)])
+        self.columns = np.vstack([own, graph.shared_offset + shared.reshape(kind.shared, members.size)])
         self.row_indices = graph.row_offset[members] + np.arange(kind.rows)[:, None]
 
     def mapped(self, graph: "_Graph", name: str, *extra: ca.MX) -> list[ca.MX]:

@@ -21,8 +21,6 @@ DYNAMICS = slice(0, 12)
 PAIR_SIDES = slice(12, 20)
 PRODUCTS = slice(20, 28)
 ROW_WIDTH = 28
-# The sides b of the pairs, in the order of `contact_pairs`, are variables: their rows in a point's column.
-PAIR_VARIABLES = (17, 21, 15, 16, 20, 22, 18, 19)
 
 
 @dataclass(frozen=True)

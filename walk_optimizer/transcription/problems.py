@@ -57,7 +57,7 @@ def _variable_bounds(request: GaitRequest, walker: WalkerParameters) -> tuple[Fl
     return lower, upper
 
 
-def _spring_bounds(mode: SpringMode, walker: WalkerParameters) -> tuple[KneeSpring, KneeSpring]:
+def spring_bounds(mode: SpringMode, walker: WalkerParameters) -> tuple[KneeSpring, KneeSpring]:
     """Return the least and largest K and q_eq of a spring mode."""
     if mode is SpringMode.NONE:
         return KneeSpring(), KneeSpring()
@@ -79,7 +79,7 @@ class _Bounds:
     def problem(self) -> Problem:
         """Return the problem of the rows that have a bound."""
         rows = np.isfinite(self.lower_rows) | np.isfinite(self.upper_rows)
-        low, high = _spring_bounds(self.request.spring_mode, self.walker)
+        low, high = spring_bounds(self.request.spring_mode, self.walker)
         kept = rows.ravel(order="F")
         intervals = np.full(self.request.points, self.request.interval)
         step_length = self.request.step_length / self.walker.leg_length

@@ -47,6 +47,6 @@ class Problem:
     upper_g: FloatArray
 
     def infeasibility(self, x: FloatArray, g: FloatArray) -> float:
-        """Return the largest violation of any bound at x with rows g."""
+        """Return the largest violation of any bound at x with rows g; not a number if any value is not."""
         gaps = (self.lower_x - x, x - self.upper_x, self.lower_g - g, g - self.upper_g)
-        return max(0.0, *(float(gap.max()) for gap in gaps))
+        return float(np.max([0.0, *(gap.max() for gap in gaps)]))

@@ -43,7 +43,9 @@ def _polynomials() -> tuple[FloatArray, FloatArray, FloatArray]:
     the interval [0, 1].
     """
     nodes = np.concatenate([[0.0], NODES])
-    basis = [np.poly1d(np.poly(np.delete(nodes, j)) / np.prod(nodes[j] - np.delete(nodes, j))) for j in range(4)]
+    basis = [
+        np.poly1d(np.poly(np.delete(nodes, j)) / np.prod(nodes[j] - np.delete(nodes, j))) for j in range(4)
+    ]
     weights = np.array([[polynomial.deriv()(node) for polynomial in basis] for node in NODES])
     quadrature = np.linalg.solve(np.vander(NODES, increasing=True).T, 1 / np.arange(1, 4))
     return weights[:, 0], weights[:, 1:], quadrature

@@ -1,0 +1,105 @@
+"""The refined solution of a step: polynomials on the collocation intervals."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.transcription.radau import NODES, QUADRATURE
+
+FloatArray = NDArray[np.float64]
+
+
+def _monomial_matrix(nodes: FloatArray) -> FloatArray:
+    """Return the matrix that turns values at nodes into coefficients, lowest power first."""
+    return np.linalg.inv(np.vander(nodes, increasing=True))
+
+
+_STATE_COEFFICIENTS = _monomial_matrix(np.concatenate([[0.0], NODES]))
+_NODE_COEFFICIENTS = _monomial_matrix(NODES)
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedTrajectory:
+    """A step on collocation intervals; arrays are read-only.
+
+    States are cubic in each interval, torques and ground reactions quadratic. States jump between
+    intervals where a foot lands.
+
+    Attributes:
+        breaks: Ends of the intervals from 0 to the step time in [s], (n + 1,).
+        states: q (6) and p (6) at the start of each interval and at its three nodes, (n, 4, 12).
+        torques: u at the nodes in [N m], (n, 3, 3).
+        forces: Ground reactions at the nodes in [N], (n, 3, 4): x, y of foot 1, then of foot 2.
+        impulses: Of the impact before each interval in [N s], (n, 4); zero where there is none.
+    """
+
+    breaks: FloatArray
+    states: FloatArray
+    torques: FloatArray
+    forces: FloatArray
+    impulses: FloatArray
+
+    def __post_init__(self) -> None:
+        """Make every array read-only."""
+        for name in ("breaks", "states", "torques", "forces", "impulses"):
+            copy = np.array(getattr(self, name), dtype=np.float64)
+            copy.setflags(write=False)
+            object.__setattr__(self, name, copy)
+
+    @property
+    def intervals(self) -> int:
+        """Number n of intervals."""
+        return self.breaks.size - 1
+
+    @property
+    def step_time(self) -> float:
+        """Duration of the step in [s]."""
+        return float(self.breaks[-1])
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """Lengths of the intervals in [s], (n,)."""
+        return np.diff(self.breaks)
+
+    @property
+    def torque_effort(self) -> float:
+        """Integral over the step of 1/2 |u|^2 dt in [(N m)^2 s]; exact for the quadratic torques' squares
+        to the order of the collocation.
+        """
+        return float(np.einsum("n,j,njk->", self.lengths, QUADRATURE, self.torques**2) / 2)
+
+    @cached_property
+    def _state_polynomials(self) -> FloatArray:
+        return np.einsum("kj,njs->nks", _STATE_COEFFICIENTS, self.states)
+
+    @cached_property
+    def _torque_polynomials(self) -> FloatArray:
+        return np.einsum("kj,njs->nks", _NODE_COEFFICIENTS, self.torques)
+
+    @cached_property
+    def _force_polynomials(self) -> FloatArray:
+        return np.einsum("kj,njs->nks", _NODE_COEFFICIENTS, self.forces)
+
+    def locate(self, time: float) -> tuple[int, float]:
+        """Return the interval of a time in [s] and the place in it, in [0, 1]."""
+        index = int(np.clip(self.breaks.searchsorted(time, side="left") - 1, 0, self.intervals - 1))
+        return index, (time - self.breaks[index]) / float(self.lengths[index])
+
+    def state(self, index: int, place: float) -> FloatArray:
+        """Return q and p, (12,), at a place of an interval."""
+        return place ** np.arange(4) @ self._state_polynomials[index]
+
+    def state_rate(self, index: int, place: float) -> FloatArray:
+        """Return the time derivative of the state polynomial, (12,)."""
+        powers = np.array([0.0, 1.0, 2 * place, 3 * place**2])
+        return powers @ self._state_polynomials[index] / float(self.lengths[index])
+
+    def torque(self, index: int, place: float) -> FloatArray:
+        """Return u in [N m], (3,), at a place of an interval."""
+        return place ** np.arange(3) @ self._torque_polynomials[index]
+
+    def force(self, index: int, place: float) -> FloatArray:
+        """Return the ground reactions in [N], (4,), at a place of an interval."""
+        return place ** np.arange(3) @ self._force_polynomials[index]

@@ -1,0 +1,181 @@
+"""Refines a gait of the report's grid: Radau collocation on a mesh adapted to an error estimate."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.contact.observation import schedule_of
+from walk_optimizer.contact.schedule import FootMode, single_impact
+from walk_optimizer.gait import Gait
+from walk_optimizer.model.parameters import KneeSpring
+from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.replay import interval_errors
+from walk_optimizer.solve.session import SolveSession
+from walk_optimizer.solve.status import Status
+from walk_optimizer.transcription.phases import INSTANT_POINTS, Phase, phases_of
+from walk_optimizer.transcription.refined import Mesh, RefinedPoints, RefinedProblem
+from walk_optimizer.transcription.scaling import torque_unit
+
+FloatArray = NDArray[np.float64]
+
+_INITIAL_INTERVALS = 24
+_FEWEST_INTERVALS = 3
+_MOST_PHASES = 3
+_ROUNDS = 4
+_MOST_PARTS = 4
+_SAFETY = 0.5
+# Barrier parameter for a start from the report's grid or from a coarser mesh.
+_BARRIER = 1e-5
+# Largest difference of an interval from its replay, in [rad] or [m].
+LOCAL_ERROR = 2e-7
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedSolution:
+    """What a refinement led to.
+
+    Attributes:
+        status: How its last solve ended.
+        mesh: Phases and intervals.
+        trajectory: The step; None unless it was solved.
+        spring: K and q_eq.
+        local_error: Largest error of an interval in [rad] or [m]; infinite before it is estimated.
+    """
+
+    status: Status
+    mesh: Mesh
+    trajectory: RefinedTrajectory | None
+    spring: KneeSpring
+    local_error: float = np.inf
+
+    @property
+    def effort(self) -> float:
+        """Integral of 1/2 |u|^2 dt in [(N m)^2 s]; infinite without a solution."""
+        return np.inf if self.trajectory is None else self.trajectory.torque_effort
+
+
+def refine(gait: Gait, session: SolveSession) -> RefinedSolution:
+    """Return the accurate solution with the contact phases of a gait.
+
+    Args:
+        gait: The gait on the report's grid: it gives phases and first guess.
+        session: Clock, cancelling and progress.
+    """
+    return _Refinement(gait, session).run()
+
+
+class _Refinement:
+    """One gait's refinement."""
+
+    def __init__(self, gait: Gait, session: SolveSession) -> None:
+        self.gait, self.session, self.walker, self.request = gait, session, gait.walker, gait.request
+
+    def run(self) -> RefinedSolution:
+        """Return the best of the contact plans, on a mesh fine enough for its error."""
+        solutions = [self._solved(mesh, self._initial_points(mesh)) for mesh in self._initial_meshes()]
+        best = min(solutions, key=lambda one: one.effort)
+        for _ in range(_ROUNDS):
+            if best.trajectory is None:
+                return best
+            errors = interval_errors(self.walker, best.spring, best.trajectory)
+            best = replace(best, local_error=float(errors.max()))
+            if best.local_error <= LOCAL_ERROR:
+                return best
+            best = self._solved(*_divided(best, errors))
+        return best
+
+    def _initial_meshes(self) -> list[Mesh]:
+        """Return even meshes of the gait's own phases and of plain single support.
+
+        Contacts of the report's grid that last an instant, and the brushing of a swing foot, are often
+        made by its coarseness: plain single support may be as good or better.
+        """
+        trajectory = self.gait.trajectory
+        schedule = schedule_of(self.walker, trajectory.q, trajectory.p, trajectory.reaction)
+        own, plain = phases_of(schedule), phases_of(single_impact(trajectory.points))
+        slips = any(mode > FootMode.STICK for phase in own for mode in (*phase.modes, *phase.impact))
+        plans = [plain] if own == plain or slips or len(own) > _MOST_PHASES else [own, plain]
+        return [_even_mesh(phases) for phases in plans]
+
+    def _initial_points(self, mesh: Mesh) -> RefinedPoints:
+        """Interpolate the grid's states, torques and forces onto the mesh.
+
+        The forces of the first points are impulses of the impact spread over an interval: the points
+        after them take their place.
+        """
+        trajectory = self.gait.trajectory
+        durations = np.diff([phase.start for phase in mesh.phases] + [1.0]) * self.request.step_time
+        nodes = mesh.node_times(durations)
+        forces = trajectory.net_reaction()
+        forces[:, :INSTANT_POINTS] = forces[:, INSTANT_POINTS : INSTANT_POINTS + 1]
+
+        def at(rows: FloatArray, when: FloatArray) -> FloatArray:
+            return np.stack([np.interp(when, trajectory.time, row) for row in rows], axis=-1)
+
+        return RefinedPoints(
+            states=at(np.vstack([trajectory.q, trajectory.p]), nodes),
+            torques=at(trajectory.u, nodes[:, 1:]),
+            forces=at(forces, nodes[:, 1:]),
+            durations=durations,
+            impulses=np.zeros((len(mesh.phases), 4)),
+            spring=self.gait.spring,
+        )
+
+    def _solved(self, mesh: Mesh, points: RefinedPoints) -> RefinedSolution:
+        refined = RefinedProblem(self.request, self.walker, mesh)
+        unit = torque_unit(self.walker) ** 2 / self.request.interval
+        solution = self.session.solve(
+            refined.problem(), refined.pack(points), "refinement", objective_unit=unit, barrier=_BARRIER
+        )
+        if not solution.solved:
+            return RefinedSolution(solution.status, mesh, None, points.spring)
+        found = refined.unpack(solution.x)
+        return RefinedSolution(Status.SOLVED, mesh, _trajectory(mesh, found), found.spring)
+
+
+def _even_mesh(phases: tuple[Phase, ...]) -> Mesh:
+    """Return a mesh of even intervals in each phase, in proportion to their lengths."""
+    shares = np.diff([phase.start for phase in phases] + [1.0])
+    counts = np.maximum(_FEWEST_INTERVALS, np.round(shares * _INITIAL_INTERVALS).astype(int))
+    return Mesh(phases, tuple(np.full(count, 1 / count) for count in counts))
+
+
+def _divided(solution: RefinedSolution, errors: FloatArray) -> tuple[Mesh, RefinedPoints]:
+    """Return a mesh with parts of the intervals that are too long, and the solution at its nodes.
+
+    The local error of an interval falls with the sixth power of its length.
+    """
+    parts = np.ceil((errors / (_SAFETY * LOCAL_ERROR)) ** (1 / 6)).astype(int)
+    mesh = solution.mesh.divided(np.clip(parts, 1, _MOST_PARTS))
+    if solution.trajectory is None:
+        raise ValueError("only a solution can be divided")
+    return mesh, _resampled(solution.trajectory, solution.spring, solution.mesh, mesh)
+
+
+def _trajectory(mesh: Mesh, points: RefinedPoints) -> RefinedTrajectory:
+    """Return the values on a mesh as a trajectory."""
+    breaks = np.concatenate([[0.0], np.cumsum(mesh.lengths(points.durations))])
+    impulses = np.zeros((mesh.intervals, 4))
+    impulses[mesh.first_intervals] = points.impulses
+    return RefinedTrajectory(breaks, points.states, points.torques, points.forces, impulses)
+
+
+def _resampled(old: RefinedTrajectory, spring: KneeSpring, old_mesh: Mesh, mesh: Mesh) -> RefinedPoints:
+    """Evaluate the polynomials of a solution at the nodes of another mesh of the same phases."""
+    first = old_mesh.first_intervals
+    ends = [*old.breaks[first], old.step_time]
+    nodes = mesh.node_times(np.diff(ends))
+    intervals = [old.locate(float((when[0] + when[-1]) / 2))[0] for when in nodes]
+    places = [
+        (when - old.breaks[index]) / old.lengths[index] for index, when in zip(intervals, nodes, strict=True)
+    ]
+    pairs = list(zip(intervals, places, strict=True))
+    return RefinedPoints(
+        states=np.array([[old.state(i, x) for x in place] for i, place in pairs]),
+        torques=np.array([[old.torque(i, x) for x in place[1:]] for i, place in pairs]),
+        forces=np.array([[old.force(i, x) for x in place[1:]] for i, place in pairs]),
+        durations=np.diff(ends),
+        impulses=old.impulses[first],
+        spring=spring,
+    )

@@ -1,0 +1,82 @@
+"""Contact phases of a step: what the refined grid takes from the report's grid."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from walk_optimizer.contact.schedule import FootMode, Schedule
+
+# A contact that lasts no longer than this many grid points is an impulse on the refined grid.
+INSTANT_POINTS = 2
+Modes = tuple[FootMode, FootMode]
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A part of the step in which no foot changes its behaviour.
+
+    Attributes:
+        modes: What each foot does.
+        impact: What each foot does in the impact that begins the phase; `FREE` feet take no impulse.
+        landing: Which feet come down in that impact; the others that take part stood before.
+        start: Where the phase begins, as a part of the step in [0, 1).
+    """
+
+    modes: Modes
+    impact: Modes
+    landing: tuple[bool, bool]
+    start: float
+
+    @property
+    def begins_with_impact(self) -> bool:
+        """Whether any foot takes an impulse as the phase begins."""
+        return any(mode is not FootMode.FREE for mode in self.impact)
+
+
+def phases_of(schedule: Schedule) -> tuple[Phase, ...]:
+    """Return the phases of a schedule (2, N), the first one beginning with the step.
+
+    Runs of a few points become part of the impact of the phase after them. Wherever a foot makes
+    contact anew, every foot that stands then or right after takes part in the impact.
+    """
+    runs = _runs(schedule)
+    last = max(index for index, (length, _) in enumerate(runs) if length > INSTANT_POINTS)
+    before = _relabelled(runs[last][1])
+    phases: list[Phase] = []
+    # What happens in the last instant of a step belongs to the impact that begins the next.
+    instant = [_relabelled(modes) for _, modes in runs[last + 1 :]]
+    start = 0
+    for length, modes in runs[: last + 1]:
+        if length <= INSTANT_POINTS:
+            instant.append(modes)
+            continue
+        seen = [*instant, modes]
+        contacts = _first_contacts(seen)
+        first, second = (not before[foot] and bool(contacts[foot]) for foot in range(2))
+        impact = contacts if first or second else (FootMode.FREE, FootMode.FREE)
+        phases.append(Phase(modes, impact, (first, second), start / schedule.shape[1]))
+        before, instant = modes, []
+        start += length
+    return tuple(phases)
+
+
+def _runs(schedule: Schedule) -> list[tuple[int, Modes]]:
+    """Return length and modes of each run of equal columns."""
+    changes = np.flatnonzero(np.any(np.diff(schedule, axis=1) != 0, axis=0)) + 1
+    bounds = np.concatenate([[0], changes, [schedule.shape[1]]])
+    return [
+        (int(end - begin), (FootMode(schedule[0, begin]), FootMode(schedule[1, begin])))
+        for begin, end in pairwise(bounds)
+    ]
+
+
+def _relabelled(modes: Modes) -> Modes:
+    return modes[1], modes[0]
+
+
+def _first_contacts(seen: list[Modes]) -> Modes:
+    """Return for each foot the first contact among modes in order, `FREE` where there is none."""
+    contacts = (next((one[foot] for one in seen if one[foot]), FootMode.FREE) for foot in range(2))
+    first, second = contacts
+    return first, second
