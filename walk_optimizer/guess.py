@@ -39,7 +39,8 @@ def kinematic_guess(walker: WalkerParameters, request: GaitRequest, shape: Guess
     phase = np.arange(request.points + 1) / request.points
     leg = walker.leg_length * (1 - shape.flexion)
     hip_x = request.step_length * (phase - 0.5)
-    hip = np.array([hip_x, np.sqrt(leg**2 - hip_x**2)])
+    # Steps up to two stretched legs are possible: where the bent leg is too short, the hip is on the ground.
+    hip = np.array([hip_x, np.sqrt(np.maximum(leg**2 - hip_x**2, 0.0))])
     cycloid = phase - np.sin(2 * np.pi * phase) / (2 * np.pi)
     swing_x = request.step_length * (2 * cycloid - 1)
     swing = np.array([swing_x, shape.clearance * walker.leg_length * np.sin(np.pi * phase) ** 2])
@@ -50,13 +51,14 @@ def kinematic_guess(walker: WalkerParameters, request: GaitRequest, shape: Guess
 def _leg_angles(walker: WalkerParameters, foot: FloatArray) -> FloatArray:
     """Return upper-leg and knee angle, (2, M), that place the foot at (2, M) relative to the hip.
 
-    The cosine rule gives the inner knee angle; the knee points forward. Feet out of reach are
-    brought to the stretched leg.
+    The cosine rule gives the inner knee angle k; the knee points forward. Seen from the hip, the foot
+    is upper - lower cos k along the upper leg and lower sin k behind it. Feet out of reach are brought
+    to the stretched leg.
     """
     upper, lower = walker.upper_leg_length, walker.lower_leg_length
     reach = np.minimum(np.hypot(*foot), (upper + lower) * (1 - 1e-6))
     knee = np.arccos(np.clip((upper**2 + lower**2 - reach**2) / (2 * upper * lower), -1, 1))
-    lead = np.arcsin(np.clip(lower * np.sin(knee) / reach, -1, 1))
+    lead = np.arctan2(lower * np.sin(knee), upper - lower * np.cos(knee))
     return np.array([np.arctan2(foot[0], -foot[1]) + lead, knee])
 
 
