@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import FamilyViolation, SolveReport
 
@@ -118,8 +119,25 @@ class Trajectory:
 
 
 @dataclass(frozen=True, eq=False)
+class RefinedGait:
+    """The accurate solution with the contact phases of a gait: what a controller is fed.
+
+    Attributes:
+        trajectory: One step on collocation intervals.
+        spring: K and q_eq of both knees.
+        step_length: Length of the step in [m].
+        certificate: Its residuals, computed apart from the solver.
+    """
+
+    trajectory: RefinedTrajectory
+    spring: KneeSpring
+    step_length: float
+    certificate: Certificate
+
+
+@dataclass(frozen=True, eq=False)
 class Gait:
-    """A solved gait on the report's grid.
+    """A solved gait on the report's grid, with its refinement where there is one.
 
     Attributes:
         walker: The walker that it was solved for.
@@ -129,6 +147,7 @@ class Gait:
         report: How it was solved.
         certificate: Its residuals, computed apart from the solver.
         step_length: Length of the step in [m]; at least the requested one.
+        refined: The accurate solution; None where the refinement did not converge.
     """
 
     walker: WalkerParameters
@@ -138,6 +157,7 @@ class Gait:
     report: SolveReport
     certificate: Certificate
     step_length: float
+    refined: RefinedGait | None = None
 
     @property
     def speed(self) -> float:

@@ -6,18 +6,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.transcription.radau import NODES, QUADRATURE
+from walk_optimizer.transcription.tableau import NODE_COEFFICIENTS, QUADRATURE, STATE_COEFFICIENTS
 
 FloatArray = NDArray[np.float64]
-
-
-def _monomial_matrix(nodes: FloatArray) -> FloatArray:
-    """Return the matrix that turns values at nodes into coefficients, lowest power first."""
-    return np.linalg.inv(np.vander(nodes, increasing=True))
-
-
-_STATE_COEFFICIENTS = _monomial_matrix(np.concatenate([[0.0], NODES]))
-_NODE_COEFFICIENTS = _monomial_matrix(NODES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,22 +56,20 @@ class RefinedTrajectory:
 
     @property
     def torque_effort(self) -> float:
-        """Integral over the step of 1/2 |u|^2 dt in [(N m)^2 s]; exact for the quadratic torques' squares
-        to the order of the collocation.
-        """
+        """Integral over the step of 1/2 |u|^2 dt in [(N m)^2 s], by the method's own quadrature."""
         return float(np.einsum("n,j,njk->", self.lengths, QUADRATURE, self.torques**2) / 2)
 
     @cached_property
     def _state_polynomials(self) -> FloatArray:
-        return np.einsum("kj,njs->nks", _STATE_COEFFICIENTS, self.states)
+        return np.einsum("kj,njs->nks", STATE_COEFFICIENTS, self.states)
 
     @cached_property
     def _torque_polynomials(self) -> FloatArray:
-        return np.einsum("kj,njs->nks", _NODE_COEFFICIENTS, self.torques)
+        return np.einsum("kj,njs->nks", NODE_COEFFICIENTS, self.torques)
 
     @cached_property
     def _force_polynomials(self) -> FloatArray:
-        return np.einsum("kj,njs->nks", _NODE_COEFFICIENTS, self.forces)
+        return np.einsum("kj,njs->nks", NODE_COEFFICIENTS, self.forces)
 
     def locate(self, time: float) -> tuple[int, float]:
         """Return the interval of a time in [s] and the place in it, in [0, 1]."""

@@ -13,14 +13,11 @@ import numpy as np
 from walk_optimizer.model import dynamics
 from walk_optimizer.model.kinematics import foot_position
 from walk_optimizer.model.symbolic import SymbolicWalker
-from walk_optimizer.transcription.chain import STATE_WIDTH, FloatArray, StageKind
+from walk_optimizer.transcription.chain import STATE_WIDTH, StageKind
 from walk_optimizer.transcription.compilation import compiled
 from walk_optimizer.transcription.scaling import point_units, spring_units
 from walk_optimizer.transcription.stage_functions import stage_functions
-
-STAGES = 3
-# Collocation points in (0, 1].
-NODES = np.array([(4 - np.sqrt(6)) / 10, (4 + np.sqrt(6)) / 10, 1.0])
+from walk_optimizer.transcription.tableau import DIFFERENTIATION, QUADRATURE, STAGES
 
 # Variables of an interval: states, then torques, then ground reactions (x, y of foot 1, of foot 2).
 INTERVAL_WIDTH = STAGES * (STATE_WIDTH + 3 + 4)
@@ -34,24 +31,6 @@ IMPACT_WIDTH = STATE_WIDTH + 4
 IMPACT_ROWS = STATE_WIDTH + CONTACT_ROWS
 # Impulses are of the order of body weight times this duration in [s].
 IMPULSE_DURATION = 0.1
-
-
-def _polynomials() -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return derivative weights of the interval's start (3,) and of its points (3, 3), and quadrature.
-
-    Entry (i, j) of the weights is the derivative at node i of the Lagrange polynomial of node j, on
-    the interval [0, 1].
-    """
-    nodes = np.concatenate([[0.0], NODES])
-    basis = [
-        np.poly1d(np.poly(np.delete(nodes, j)) / np.prod(nodes[j] - np.delete(nodes, j))) for j in range(4)
-    ]
-    weights = np.array([[polynomial.deriv()(node) for polynomial in basis] for node in NODES])
-    quadrature = np.linalg.solve(np.vander(NODES, increasing=True).T, 1 / np.arange(1, 4))
-    return weights[:, 0], weights[:, 1:], quadrature
-
-
-START_WEIGHTS, WEIGHTS, QUADRATURE = _polynomials()
 
 
 def contact_rows(walker: SymbolicWalker, q: ca.SX, qdot: ca.SX, force: ca.SX) -> ca.SX:
@@ -106,7 +85,7 @@ def interval_functions() -> list[ca.Function]:
         state = states[:, i] * state_unit
         inputs = (torques[:, i] * torque_unit, forces[:, i] * force_unit, spring, walker.symbols)
         rate, contact = point(state[:6], state[6:], *inputs)
-        rows.append(ca.mtimes(states, ca.DM(WEIGHTS[i])) - length * rate / state_unit)
+        rows.append(ca.mtimes(states, ca.DM(DIFFERENTIATION[i, 1:])) - length * rate / state_unit)
         contacts.append(contact / contact_units(walker, force_unit))
         cost += length * QUADRATURE[i] * ca.sumsqr(torques[:, i]) / 2
     par = ca.vertcat(walker.symbols, part)
@@ -141,7 +120,7 @@ def impact_functions() -> list[ca.Function]:
 def interval_kind() -> StageKind:
     """Return the collocation interval as a kind of stage."""
     previous = np.zeros((INTERVAL_ROWS, STATE_WIDTH))
-    previous[: STAGES * STATE_WIDTH] = np.kron(START_WEIGHTS[:, None], np.eye(STATE_WIDTH))
+    previous[: STAGES * STATE_WIDTH] = np.kron(DIFFERENTIATION[:, :1], np.eye(STATE_WIDTH))
     state = slice((STAGES - 1) * STATE_WIDTH, STAGES * STATE_WIDTH)
     functions = compiled(interval_functions)
     return StageKind("interval", functions, INTERVAL_WIDTH, INTERVAL_ROWS, state, 3, previous)

@@ -19,6 +19,7 @@ from walk_optimizer.transcription.phases import Modes, Phase
 from walk_optimizer.transcription.problems import spring_bounds
 from walk_optimizer.transcription.program import Nlp, Problem
 from walk_optimizer.transcription.scaling import point_units, spring_units, torque_unit
+from walk_optimizer.transcription.tableau import NODES_WITH_START, STAGES
 
 FloatArray = NDArray[np.float64]
 
@@ -81,7 +82,7 @@ class Mesh:
         """Return the times of the start and the nodes of each interval in [s], (n, 4)."""
         lengths = self.lengths(durations)
         starts = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-        return starts[:, None] + lengths[:, None] * np.concatenate([[0.0], radau.NODES])
+        return starts[:, None] + lengths[:, None] * NODES_WITH_START
 
     def divided(self, counts: NDArray[np.int64]) -> "Mesh":
         """Return the mesh with each interval cut into equal parts; `counts` is (n,)."""
@@ -154,7 +155,7 @@ class RefinedProblem:
         state_low, state_high = self._state_bounds()
         modes = [self.mesh.phases[k].modes for k in self.mesh.phase_of_interval]
         force_low, force_high = np.array([_force_bounds(one) for one in modes]).transpose(1, 0, 2)
-        free = np.full((count, radau.STAGES, 3), np.inf)
+        free = np.full((count, STAGES, 3), np.inf)
         impulses = np.array([_force_bounds(phase.impact) for phase in self.mesh.phases]).transpose(1, 0, 2)
         bounds = []
         for sign, states, forces, impulse, spring, duration in (
@@ -162,9 +163,9 @@ class RefinedProblem:
             (1, state_high, force_high, impulses[1], high, np.inf),
         ):
             points = RefinedPoints(
-                states=np.broadcast_to(states, (count, radau.STAGES + 1, STATE_WIDTH)),
+                states=np.broadcast_to(states, (count, STAGES + 1, STATE_WIDTH)),
                 torques=sign * free,
-                forces=np.repeat(forces[:, None, :], radau.STAGES, axis=1),
+                forces=np.repeat(forces[:, None, :], STAGES, axis=1),
                 durations=np.full(phases, duration),
                 impulses=impulse,
                 spring=spring,
@@ -212,9 +213,9 @@ class RefinedProblem:
         """Return the values of the scaled vector of all variables."""
         inside = x[self.interval_start[:, None] + np.arange(radau.INTERVAL_WIDTH)]
         count = self.mesh.intervals
-        nodes = inside[:, : radau.TORQUE_START].reshape(count, radau.STAGES, STATE_WIDTH) * self.state_unit
-        torques = inside[:, radau.TORQUE_START : radau.FORCE_START].reshape(count, radau.STAGES, 3)
-        forces = inside[:, radau.FORCE_START :].reshape(count, radau.STAGES, 4)
+        nodes = inside[:, : radau.TORQUE_START].reshape(count, STAGES, STATE_WIDTH) * self.state_unit
+        torques = inside[:, radau.TORQUE_START : radau.FORCE_START].reshape(count, STAGES, 3)
+        forces = inside[:, radau.FORCE_START :].reshape(count, STAGES, 4)
         before = state_before_step(self.walker, nodes[-1, -1])
         starts = np.concatenate([before[None], nodes[:-1, -1]])
         impulses = np.zeros((len(self.mesh.phases), 4))
@@ -297,8 +298,8 @@ def _interval_bounds(modes: Modes, landing: tuple[bool, bool] = (False, False)) 
     The impact after it pins the gap of a landing foot, so the last node must not bound it once more.
     """
     contact = _contact_bounds(modes)
-    dynamics = np.zeros(radau.STAGES * STATE_WIDTH)
-    low, high = (np.concatenate([dynamics, *[side] * radau.STAGES]) for side in contact)
+    dynamics = np.zeros(STAGES * STATE_WIDTH)
+    low, high = (np.concatenate([dynamics, *[side] * STAGES]) for side in contact)
     last_gaps = low[-radau.CONTACT_ROWS :][_GAP : _GAP + 2]
     last_gaps[list(landing)] = -np.inf
     return low, high
