@@ -1,14 +1,17 @@
 """What a user asks for: a speed, a spring mode, a grid. Validated here, before any work."""
 
 import math
+import operator
 import re
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
+from numbers import Real
 from pathlib import Path
+from typing import Any
 
 from walk_optimizer.errors import ConfigurationError, InvalidRequestError
 from walk_optimizer.model.parameters import SpringMode
-from walk_optimizer.resources import config_file, read_yaml
+from walk_optimizer.resources import config_file, require_positive, settings_from_yaml
 
 KMH_PER_MS = 3.6
 # The report prints km/h with two decimals: a speed within one unit of the last one names a table gait.
@@ -44,23 +47,31 @@ class GaitTableSettings:
     minimum_points: int
     maximum_points: int
 
+    def __post_init__(self) -> None:
+        """Refuse numbers that are impossible by themselves or beside each other.
+
+        Raises:
+            ConfigurationError: says which number, and what it may be.
+        """
+        require_positive(self)
+        for name, low, high in (
+            ("gaits", 2, math.inf),
+            ("minimum_speed", 0.0, self.maximum_speed),
+            ("minimum_points", 1, self.maximum_points),
+            ("points", self.minimum_points, self.maximum_points),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ConfigurationError(f"{name} is {value}, allowed is {low} to {high}")
+
     @classmethod
     def from_yaml(cls, path: Path | None = None) -> "GaitTableSettings":
         """Read the settings, by default the packaged `config/gait_table.yaml`.
 
         Raises:
-            ConfigurationError: an entry is missing, unknown or no positive number.
+            ConfigurationError: an entry is missing, unknown or impossible.
         """
-        source = path or config_file("gait_table.yaml")
-        entries = read_yaml(source)
-        names = {field.name for field in fields(cls)}
-        if set(entries) != names:
-            wrong = ", ".join(sorted(set(entries) ^ names))
-            raise ConfigurationError(f"{source}: missing or unknown entries: {wrong}")
-        for name, value in entries.items():
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
-                raise ConfigurationError(f"{source}: {name} is {value!r}, expected a positive number")
-        return cls(**entries)
+        return settings_from_yaml(cls, path or config_file("gait_table.yaml"))
 
     def table_steps(self) -> list[tuple[float, float]]:
         """Return (step length in [m], step time in [s]) of each gait of the table, slowest first."""
@@ -152,14 +163,21 @@ class GaitRequest:
         """
         settings = gait_table_settings()
         for name, value in (("step length", step_length), ("step time", step_time)):
-            if not (math.isfinite(value) and value > 0):
-                raise InvalidRequestError(f"{name} is {value}, allowed are finite numbers above 0")
+            if not (_is_number(value) and math.isfinite(value) and value > 0):
+                raise InvalidRequestError(f"{name} is {value!r}, allowed are finite numbers above 0")
         _checked_speed(step_length / step_time, settings)
         return cls(step_length, step_time, SpringMode.parse(spring_mode), _checked_points(points, settings))
 
 
+def _is_number(value: Any) -> bool:
+    """Return whether a value is a real number, of Python or NumPy; True and False are not."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
 def _checked_speed(speed: float, settings: GaitTableSettings) -> float:
     """Return the speed; raise InvalidRequestError outside the settings' range."""
+    if not _is_number(speed):
+        raise InvalidRequestError(f"speed is {speed!r}, expected a number, in m/s")
     low, high = settings.minimum_speed, settings.maximum_speed
     if not (math.isfinite(speed) and low <= speed <= high):
         raise InvalidRequestError(
@@ -174,14 +192,14 @@ def _checked_points(points: int | None, settings: GaitTableSettings) -> int:
     if points is None:
         return settings.points
     low, high = settings.minimum_points, settings.maximum_points
-    if isinstance(points, bool) or not isinstance(points, int) or not low <= points <= high:
-        estimate = (
-            f" (about {points * _BYTES_PER_POINT / 1e9:.1f} GB)"
-            if isinstance(points, int) and points > high
-            else ""
-        )
+    try:
+        count = low - 1 if isinstance(points, bool) else operator.index(points)
+    except TypeError:
+        count = low - 1
+    if not low <= count <= high:
+        estimate = f" (about {count * _BYTES_PER_POINT / 1e9:.1f} GB)" if count > high else ""
         raise InvalidRequestError(f"N is {points!r} grid points{estimate}, allowed is {low} to {high}")
-    return points
+    return count
 
 
 def parse_speed(text: str) -> float:

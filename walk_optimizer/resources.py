@@ -1,14 +1,17 @@
 """Where the files that ship beside the code are found, and how YAML is read."""
 
+import math
 import os
 import sys
+from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 
 from walk_optimizer.errors import ConfigurationError
 
+Settings = TypeVar("Settings")
 _PACKAGE = Path(__file__).resolve().parent
 
 
@@ -50,6 +53,66 @@ def read_yaml(path: Path) -> dict[str, Any]:
         raise ConfigurationError(f"{path}: can't be read: {error.strerror}") from error
     except yaml.YAMLError as error:
         raise ConfigurationError(f"{path}: not valid YAML: {error}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigurationError(f"{path}: not valid YAML: no UTF-8 text, {error.reason}") from error
     if not isinstance(content, dict):
         raise ConfigurationError(f"{path}: expected `name: value` entries")
-    return content
+    return {str(name): value for name, value in content.items()}
+
+
+def settings_from_entries(kind: type[Settings], entries: dict[str, Any], source: Path) -> Settings:
+    """Return a dataclass of settings whose own refusals name the file that the entries come from.
+
+    Raises:
+        ConfigurationError: the dataclass refuses an entry.
+    """
+    try:
+        return kind(**entries)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{source}: {error}") from error
+
+
+def settings_from_yaml(kind: type[Settings], source: Path) -> Settings:
+    """Return the dataclass of settings that a YAML file holds in full.
+
+    Raises:
+        ConfigurationError: the file can't be read, or an entry is missing, unknown or impossible.
+    """
+    entries = read_yaml(source)
+    wrong = sorted(set(entries) ^ {field.name for field in fields(kind)})  # type: ignore[arg-type]
+    if wrong:
+        raise ConfigurationError(f"{source}: missing or unknown entries: {', '.join(wrong)}")
+    return settings_from_entries(kind, entries, source)
+
+
+def require_positive(settings: Any, label: str = "") -> None:
+    """Refuse the numbers of a dataclass that are not finite and above 0; those declared int must be whole.
+
+    Args:
+        settings: The dataclass.
+        label: Stands before the name of a refused entry.
+
+    Raises:
+        ConfigurationError: names the first such entry and its value.
+    """
+    for field in fields(settings):
+        value, whole = getattr(settings, field.name), field.type is int
+        if field.type not in (int, float):
+            continue
+        number = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
+        if not (number and 0 < value < math.inf):
+            expected = "a positive whole number" if whole else "a positive number"
+            raise ConfigurationError(
+                f"{label}{field.name} is {value!r}, expected {expected}{text_hint(value)}"
+            )
+
+
+def text_hint(value: Any) -> str:
+    """Return how to write a number that YAML took for a text; empty for everything else."""
+    try:
+        number = float(value) if isinstance(value, str) else math.nan
+    except ValueError:
+        number = math.nan
+    if math.isnan(number):
+        return ""
+    return "; YAML takes it for a text: write numbers without quotes, and 1e-8 as 1.0e-8"

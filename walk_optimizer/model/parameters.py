@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from walk_optimizer.errors import ConfigurationError, InvalidRequestError
-from walk_optimizer.resources import config_file, read_yaml
+from walk_optimizer.resources import config_file, read_yaml, settings_from_entries, text_hint
 
 
 class SpringMode(StrEnum):
@@ -109,12 +109,17 @@ class WalkerParameters:
                 f"{source}: unknown walker parameter {', '.join(unknown)}; "
                 f"known are {', '.join(sorted(known))}"
             )
-        return cls(**entries)
+        return settings_from_entries(cls, entries, source)
 
     @property
     def leg_length(self) -> float:
         """Length of a stretched leg in [m]."""
         return self.upper_leg_length + self.lower_leg_length
+
+    @property
+    def longest_step(self) -> float:
+        """Largest distance of two feet on the ground in [m]: legs stretched, hips at their limit."""
+        return 2 * self.leg_length * math.sin(min(self.hip_angle_limit, math.pi / 2))
 
     @property
     def total_mass(self) -> float:
@@ -143,7 +148,7 @@ def _positive(name: str, value: Any) -> float:
         ConfigurationError: it is no finite positive number.
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ConfigurationError(f"walker parameter {name} is {value!r}, expected a number")
+        raise ConfigurationError(f"walker parameter {name} is {value!r}, expected a number{text_hint(value)}")
     if not (math.isfinite(value) and value > 0):
         raise ConfigurationError(f"walker parameter {name} is {value}, allowed are finite numbers above 0")
     return float(value)

@@ -1,11 +1,11 @@
 """Settings of the search and of the solvers (config/solver.yaml)."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from walk_optimizer.errors import ConfigurationError
-from walk_optimizer.resources import config_file, read_yaml
+from walk_optimizer.resources import config_file, require_positive, settings_from_yaml
 
 BACK_ENDS = ("ipopt",)
 
@@ -36,12 +36,7 @@ class SolverSettings:
         """Refuse values that no solve can use."""
         if self.back_end not in BACK_ENDS:
             raise ConfigurationError(f"unknown back_end {self.back_end!r}; known are {', '.join(BACK_ENDS)}")
-        for field in fields(self)[1:]:
-            value = getattr(self, field.name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
-                raise ConfigurationError(
-                    f"solver setting {field.name} is {value!r}, expected a positive number"
-                )
+        require_positive(self, "solver setting ")
 
     @classmethod
     def from_yaml(cls, path: Path | None = None) -> "SolverSettings":
@@ -50,12 +45,7 @@ class SolverSettings:
         Raises:
             ConfigurationError: an entry is missing, unknown or impossible.
         """
-        source = path or config_file("solver.yaml")
-        entries = read_yaml(source)
-        wrong = sorted(set(entries) ^ {field.name for field in fields(cls)})
-        if wrong:
-            raise ConfigurationError(f"{source}: missing or unknown entries: {', '.join(wrong)}")
-        return cls(**entries)
+        return settings_from_yaml(cls, path or config_file("solver.yaml"))
 
 
 @cache
