@@ -8,7 +8,6 @@ import pytest
 from walk_optimizer.contact.schedule import FootMode, single_impact
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.transcription import layout
 from walk_optimizer.transcription.problems import (
     complementarity_problem,
     fixed_schedule_problem,
