@@ -88,7 +88,6 @@ def test_settings_reach_the_solver():
     assert solution.iterations == 2
 
 
-@pytest.mark.xfail(reason="the solver swallows the error and calls it one of the model", strict=True)
 def test_an_error_in_a_callback_is_its_callers():
     def faulty(progress):
         raise ZeroDivisionError("in the caller's own code")
