@@ -3,11 +3,16 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from walk_optimizer.certificate import certify
+import numpy as np
+
+from walk_optimizer.certificate import certify, landing_distance
 from walk_optimizer.errors import GaitFileError
-from walk_optimizer.gait import Certificate, Gait
+from walk_optimizer.gait import Certificate, CertificateEntry, Gait
 from walk_optimizer.gait_files import SUFFIX, read_gait_file
 from walk_optimizer.model.parameters import WalkerParameters
+
+# What a file states twice may differ by this much, in [m] and [s].
+_STATED_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,15 +40,27 @@ class Verification:
 def verify_file(path: Path, walker: WalkerParameters) -> Verification:
     """Read a gait file and compute its certificate anew."""
     try:
-        gait = read_gait_file(path, walker).gait
+        gait = read_gait_file(path, walker)
     except GaitFileError as error:
         return Verification(path, None, None, str(error))
     certificate = certify(gait.walker, gait.request, gait.spring, gait.trajectory)
     failed = ", ".join(
         f"{entry.family} is {entry.violation:.3g} {entry.unit}, allowed {entry.tolerance:.3g}"
-        for entry in certificate.failures()
+        for entry in (*certificate.entries, *_stated_entries(gait))
+        if not entry.met
     )
     return Verification(path, gait, certificate, f"{path}: {failed}" if failed else "")
+
+
+def _stated_entries(gait: Gait) -> tuple[CertificateEntry, ...]:
+    """Return how far the step length and times that a file states are from its trajectory and request."""
+    landing = landing_distance(gait.walker, gait.trajectory)
+    ends = gait.request.interval * np.arange(1, gait.trajectory.points + 1)
+    lateness = float(np.abs(gait.trajectory.time - ends).max())
+    return (
+        CertificateEntry("step_length", abs(gait.step_length - landing), "m", _STATED_TOLERANCE),
+        CertificateEntry("time", lateness, "s", _STATED_TOLERANCE),
+    )
 
 
 def verify_folder(folder: Path, walker: WalkerParameters) -> list[Verification]:
