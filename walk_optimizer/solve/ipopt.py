@@ -70,13 +70,8 @@ class _Watcher(ca.Callback):
 
     def begin(self, problem: Problem, monitor: Monitor | None) -> None:
         """Watch a new solve."""
-        self.problem, self.monitor, self.verdict, self.error, self.iteration = (
-            problem,
-            monitor,
-            None,
-            None,
-            -1,
-        )
+        self.problem, self.monitor, self.iteration = problem, monitor, -1
+        self.verdict = self.error = None
 
     def end(self) -> None:
         """Let go of the solve, since its program keeps this watcher alive; raise what the monitor raised."""
