@@ -61,15 +61,18 @@ class RefinedTrajectory:
 
     @cached_property
     def _state_polynomials(self) -> FloatArray:
-        return np.einsum("kj,njs->nks", STATE_COEFFICIENTS, self.states)
+        coefficients: FloatArray = np.einsum("kj,njs->nks", STATE_COEFFICIENTS, self.states)
+        return coefficients
 
     @cached_property
     def _torque_polynomials(self) -> FloatArray:
-        return np.einsum("kj,njs->nks", NODE_COEFFICIENTS, self.torques)
+        coefficients: FloatArray = np.einsum("kj,njs->nks", NODE_COEFFICIENTS, self.torques)
+        return coefficients
 
     @cached_property
     def _force_polynomials(self) -> FloatArray:
-        return np.einsum("kj,njs->nks", NODE_COEFFICIENTS, self.forces)
+        coefficients: FloatArray = np.einsum("kj,njs->nks", NODE_COEFFICIENTS, self.forces)
+        return coefficients
 
     def locate(self, time: float) -> tuple[int, float]:
         """Return the interval of a time in [s] and the place in it, in [0, 1]."""
@@ -78,17 +81,21 @@ class RefinedTrajectory:
 
     def state(self, index: int, place: float) -> FloatArray:
         """Return q and p, (12,), at a place of an interval."""
-        return place ** np.arange(4) @ self._state_polynomials[index]
+        values: FloatArray = place ** np.arange(4) @ self._state_polynomials[index]
+        return values
 
     def state_rate(self, index: int, place: float) -> FloatArray:
         """Return the time derivative of the state polynomial, (12,)."""
         powers = np.array([0.0, 1.0, 2 * place, 3 * place**2])
-        return powers @ self._state_polynomials[index] / float(self.lengths[index])
+        rate: FloatArray = powers @ self._state_polynomials[index] / float(self.lengths[index])
+        return rate
 
     def torque(self, index: int, place: float) -> FloatArray:
         """Return u in [N m], (3,), at a place of an interval."""
-        return place ** np.arange(3) @ self._torque_polynomials[index]
+        values: FloatArray = place ** np.arange(3) @ self._torque_polynomials[index]
+        return values
 
     def force(self, index: int, place: float) -> FloatArray:
         """Return the ground reactions in [N], (4,), at a place of an interval."""
-        return place ** np.arange(3) @ self._force_polynomials[index]
+        values: FloatArray = place ** np.arange(3) @ self._force_polynomials[index]
+        return values

@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.contact.schedule import FootMode, single_impact
-from walk_optimizer.gait import Gait
+from walk_optimizer.gait import Certificate, Gait, RefinedGait
+from walk_optimizer.mechanics import foot_arm
 from walk_optimizer.model.parameters import KneeSpring
+from walk_optimizer.refined_certificate import BETWEEN_TOLERANCE, certify_refined, excess_between
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.replay import interval_errors
 from walk_optimizer.solve.session import SolveSession
@@ -55,6 +57,23 @@ class RefinedSolution:
         return np.inf if self.trajectory is None else self.trajectory.torque_effort
 
 
+def refined_gait(gait: Gait, session: SolveSession) -> RefinedGait | None:
+    """Return the certified refinement of a gait; None where there is none.
+
+    Args:
+        gait: The gait on the report's grid.
+        session: Clock, cancelling and progress.
+    """
+    solution = refine(gait, session)
+    if solution.trajectory is None:
+        return None
+    end = solution.trajectory.states[-1, -1][:6, None]
+    step_length = float(foot_arm(gait.walker, end, 1).position[0, 0])
+    bare = RefinedGait(solution.trajectory, solution.spring, step_length, Certificate(()))
+    certificate = certify_refined(gait.walker, gait.request, bare)
+    return replace(bare, certificate=certificate) if certificate.certified else None
+
+
 def refine(gait: Gait, session: SolveSession) -> RefinedSolution:
     """Return the accurate solution with the contact phases of a gait.
 
@@ -79,10 +98,11 @@ class _Refinement:
             if best.trajectory is None:
                 return best
             errors = interval_errors(self.walker, best.spring, best.trajectory)
+            excess = np.max(excess_between(self.walker, best.trajectory), axis=0)
             best = replace(best, local_error=float(errors.max()))
-            if best.local_error <= LOCAL_ERROR:
+            if best.local_error <= LOCAL_ERROR and excess.max() <= _SAFETY * BETWEEN_TOLERANCE:
                 return best
-            best = self._solved(*_divided(best, errors))
+            best = self._solved(*_divided(best, errors, excess))
         return best
 
     def _initial_meshes(self) -> list[Mesh]:
@@ -141,12 +161,19 @@ def _even_mesh(phases: tuple[Phase, ...]) -> Mesh:
     return Mesh(phases, tuple(np.full(count, 1 / count) for count in counts))
 
 
-def _divided(solution: RefinedSolution, errors: FloatArray) -> tuple[Mesh, RefinedPoints]:
+def _divided(solution: RefinedSolution, errors: FloatArray, excess: FloatArray) -> tuple[Mesh, RefinedPoints]:
     """Return a mesh with parts of the intervals that are too long, and the solution at its nodes.
 
-    The local error of an interval falls with the sixth power of its length.
+    The local error of an interval falls with the sixth power of its length. Where a bound is left
+    between the nodes the interval is halved.
+
+    Args:
+        solution: On the present mesh.
+        errors: Local error of each interval, (n,).
+        excess: How far each leaves its bounds between the nodes, (n,).
     """
     parts = np.ceil((errors / (_SAFETY * LOCAL_ERROR)) ** (1 / 6)).astype(int)
+    parts = np.maximum(parts, np.where(excess > _SAFETY * BETWEEN_TOLERANCE, 2, 1))
     mesh = solution.mesh.divided(np.clip(parts, 1, _MOST_PARTS))
     if solution.trajectory is None:
         raise ValueError("only a solution can be divided")

@@ -59,9 +59,11 @@ def replay_interval(
     length = float(trajectory.lengths[index])
 
     def derivative(time: float, current: FloatArray) -> FloatArray:
-        return np.asarray(rate(current, trajectory.torque(index, time / length), *parameters)).ravel()
+        torque = trajectory.torque(index, time / length)
+        return np.array(rate(current, torque, *parameters), dtype=float).ravel()
 
-    return solve_ivp(derivative, (0.0, length), state, method="DOP853", **_TOLERANCES).y[:, -1]
+    end: FloatArray = solve_ivp(derivative, (0.0, length), state, method="DOP853", **_TOLERANCES).y[:, -1]
+    return end
 
 
 def _standing(trajectory: RefinedTrajectory, index: int) -> Standing:
@@ -81,7 +83,8 @@ def interval_errors(
         replay_interval(walker, spring, trajectory, index, trajectory.states[index, 0])
         for index in range(trajectory.intervals)
     ]
-    return np.abs(np.array(ends) - trajectory.states[:, -1])[:, :6].max(axis=1)
+    errors: FloatArray = np.abs(np.array(ends) - trajectory.states[:, -1])[:, :6].max(axis=1)
+    return errors
 
 
 def replay_step(walker: WalkerParameters, spring: KneeSpring, trajectory: RefinedTrajectory) -> FloatArray:

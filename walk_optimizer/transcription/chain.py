@@ -156,7 +156,7 @@ class _Graph:
     @property
     def row_count(self) -> int:
         """Rows of the program."""
-        return int(self.kept.size) + 1 + self.shared_rows.shape[0]
+        return int(self.kept.size) + 1 + int(self.shared_rows.shape[0])
 
     def _rows(self, own: Sequence[ca.MX], end: ca.MX) -> ca.MX:
         """Return g from the groups' own rows, and the boundary's 13 rows of the last state."""

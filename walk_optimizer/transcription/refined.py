@@ -82,7 +82,8 @@ class Mesh:
         """Return the times of the start and the nodes of each interval in [s], (n, 4)."""
         lengths = self.lengths(durations)
         starts = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-        return starts[:, None] + lengths[:, None] * NODES_WITH_START
+        times: FloatArray = starts[:, None] + lengths[:, None] * NODES_WITH_START
+        return times
 
     def divided(self, counts: NDArray[np.int64]) -> "Mesh":
         """Return the mesh with each interval cut into equal parts; `counts` is (n,)."""
@@ -239,7 +240,8 @@ def state_before_step(walker: WalkerParameters, state: FloatArray) -> FloatArray
     """Return the state (12,) before the next step's impact: legs relabelled, hip back by the step length."""
     function = compiled(boundary_functions)["boundary_value"]
     units = np.array(point_units(walker)[:STATE_WIDTH], dtype=float)
-    return np.asarray(function(state / units, walker.vector())).ravel()[:STATE_WIDTH] * units
+    before: FloatArray = np.asarray(function(state / units, walker.vector())).ravel()[:STATE_WIDTH] * units
+    return before
 
 
 _Layout = tuple[tuple[Phase, int], ...]

@@ -16,7 +16,8 @@ NODES_WITH_START = np.concatenate([[0.0], NODES])
 
 def _coefficients(nodes: FloatArray) -> FloatArray:
     """Return the matrix that turns values at nodes into coefficients of powers, lowest first."""
-    return np.linalg.inv(np.vander(nodes, increasing=True))
+    coefficients: FloatArray = np.linalg.inv(np.vander(nodes, increasing=True)).astype(np.float64)
+    return coefficients
 
 
 # States are cubic through the start and the nodes, torques and forces quadratic through the nodes.

@@ -1,0 +1,148 @@
+"""Residuals of a refined gait in plain NumPy and by an integrator, apart from the solver."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.certificate import RELATIVE_TOLERANCE, spring_entries
+from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
+from walk_optimizer.mechanics import Mechanics, foot_arm, mechanics_at
+from walk_optimizer.model.kinematics import RELABELLED
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.replay import interval_errors
+from walk_optimizer.request import GaitRequest
+from walk_optimizer.transcription.tableau import DIFFERENTIATION
+
+FloatArray = NDArray[np.float64]
+
+_TOLERANCE = 1e-6
+# Between the nodes nothing is constrained: there the foot may dip, and the knee bend, by so much.
+BETWEEN_TOLERANCE = 1e-4
+_PLACES_BETWEEN = np.linspace(0.0, 1.0, 9)
+
+
+def certify_refined(walker: WalkerParameters, request: GaitRequest, gait: RefinedGait) -> Certificate:
+    """Return the residuals of a refined gait; its own certificate is not looked at.
+
+    The collocation equations are evaluated at the nodes, and each interval is replayed from its start
+    by a tight integrator. Rows in [m] and [rad], in [N] and [N m] are judged together.
+
+    Args:
+        walker: The walker.
+        request: Speed and step that the gait has to meet.
+        gait: The refined gait.
+    """
+    trajectory = gait.trajectory
+    nodes = trajectory.states[:, 1:].reshape(-1, 12).T
+    mechanics = mechanics_at(walker, gait.spring, nodes[:6], nodes[6:])
+    forces = trajectory.forces.reshape(-1, 4).T
+    error = _largest(interval_errors(walker, gait.spring, trajectory))
+    shortfall = request.speed - gait.step_length / trajectory.step_time
+    entries = [
+        *_collocation_entries(walker, trajectory, mechanics),
+        CertificateEntry("interval_replay", error, "m, rad", _TOLERANCE),
+        *_jump_entries(walker, gait),
+        CertificateEntry("speed", _largest(np.maximum(shortfall, 0.0)), "m/s", _TOLERANCE),
+        CertificateEntry("landing", _landing_error(walker, gait), "m", _TOLERANCE),
+        *_contact_entries(walker, mechanics, forces),
+        *_bound_entries(walker, trajectory),
+        *spring_entries(walker, request.spring_mode, gait.spring),
+    ]
+    return Certificate(tuple(entries))
+
+
+def _largest(values: FloatArray) -> float:
+    """Return the largest magnitude; not a number if any value is not."""
+    return float(np.abs(values).max())
+
+
+def _collocation_entries(
+    walker: WalkerParameters, trajectory: RefinedTrajectory, mechanics: Mechanics
+) -> list[CertificateEntry]:
+    """Return the defects of states and momenta at the nodes, per unit of time."""
+    rates = np.einsum("ij,njs->nis", DIFFERENTIATION, trajectory.states) / trajectory.lengths[:, None, None]
+    flat = rates.reshape(-1, 12).T
+    torques, forces = trajectory.torques.reshape(-1, 3).T, trajectory.forces.reshape(-1, 4).T
+    velocity_defect = flat[:6] - mechanics.qdot
+    force_defect = flat[6:] - mechanics.momentum_rate(torques, forces)
+    return [
+        CertificateEntry("kinematics", _largest(velocity_defect), "m/s, rad/s", _TOLERANCE),
+        CertificateEntry("dynamics", _largest(force_defect), "N, N m", RELATIVE_TOLERANCE * walker.weight),
+    ]
+
+
+def _jump_entries(walker: WalkerParameters, gait: RefinedGait) -> list[CertificateEntry]:
+    """Return what the impacts leave over between the intervals, the last and the first included."""
+    trajectory = gait.trajectory
+    ends = np.roll(trajectory.states[:, -1], 1, axis=0).T
+    ends[:, 0] = ends[[*RELABELLED, *(6 + row for row in RELABELLED)], 0]
+    ends[0, 0] -= gait.step_length
+    starts = trajectory.states[:, 0].T
+    mechanics = mechanics_at(walker, gait.spring, starts[:6], starts[6:])
+    impulse = mechanics.generalized(trajectory.impulses.T)
+    tolerance = RELATIVE_TOLERANCE * walker.total_mass
+    return [
+        CertificateEntry("continuity", _largest(starts[:6] - ends[:6]), "m, rad", _TOLERANCE),
+        CertificateEntry("impact", _largest(starts[6:] - ends[6:] - impulse), "N s, N m s", tolerance),
+        CertificateEntry("impact_cone", _cone_excess(walker, trajectory.impulses.T), "N s", tolerance),
+    ]
+
+
+def _cone_excess(walker: WalkerParameters, forces: FloatArray) -> float:
+    """Return how far forces or impulses (4, N) reach beyond their friction cones or pull."""
+    tangential, normal = forces[[0, 2]], forces[[1, 3]]
+    excess = np.abs(tangential) - walker.friction_coefficient * normal
+    return float(np.maximum(0.0, np.maximum(excess, -normal)).max())
+
+
+def _landing_error(walker: WalkerParameters, gait: RefinedGait) -> float:
+    """Return how far foot 2 lands from one step length ahead, or from the ground."""
+    end = gait.trajectory.states[-1, -1][:6, None]
+    return _largest(foot_arm(walker, end, 1).position[:, 0] - np.array([gait.step_length, 0.0]))
+
+
+def _contact_entries(
+    walker: WalkerParameters, mechanics: Mechanics, forces: FloatArray
+) -> list[CertificateEntry]:
+    """Return what the feet do at the nodes: those under load stand, none is below the ground."""
+    gaps = np.array([foot.position[1] for foot in mechanics.feet])
+    loaded = np.array([forces[:2].any(axis=0), forces[2:].any(axis=0)])
+    speeds = np.array([np.abs(mechanics.foot_velocity(leg)).max(axis=0) for leg in range(2)])
+    force_tolerance = RELATIVE_TOLERANCE * walker.weight
+    return [
+        CertificateEntry("stance_velocity", _largest(np.where(loaded, speeds, 0.0)), "m/s", _TOLERANCE),
+        CertificateEntry("stance_height", _largest(np.where(loaded, gaps, 0.0)), "m", _TOLERANCE),
+        CertificateEntry("penetration", _largest(np.minimum(gaps, 0.0)), "m", _TOLERANCE),
+        CertificateEntry("friction_cone", _cone_excess(walker, forces), "N", force_tolerance),
+    ]
+
+
+def _bound_entries(walker: WalkerParameters, trajectory: RefinedTrajectory) -> list[CertificateEntry]:
+    """Return violations of joint limits and forward momentum at the nodes, and of what may lie between."""
+    nodes = trajectory.states[:, 1:].reshape(-1, 12).T
+    angle = _largest(_angle_excess(walker, nodes))
+    angles_between, dips_between = excess_between(walker, trajectory)
+    tolerance = RELATIVE_TOLERANCE * walker.total_mass
+    return [
+        CertificateEntry("joint_limits", angle, "rad", _TOLERANCE),
+        CertificateEntry("joint_limits_between", _largest(angles_between), "rad", BETWEEN_TOLERANCE),
+        CertificateEntry("penetration_between", _largest(dips_between), "m", BETWEEN_TOLERANCE),
+        CertificateEntry("forward_momentum", _largest(np.minimum(nodes[6], 0.0)), "kg m/s", tolerance),
+    ]
+
+
+def excess_between(walker: WalkerParameters, trajectory: RefinedTrajectory) -> tuple[FloatArray, FloatArray]:
+    """Return how far each interval's polynomials leave the joint limits [rad] and the air [m], (n,) each."""
+    pairs = ((index, place) for index in range(trajectory.intervals) for place in _PLACES_BETWEEN)
+    between = np.array([trajectory.state(*pair) for pair in pairs]).T
+    dips = np.array([-foot_arm(walker, between[:6], leg).position[1] for leg in range(2)]).max(axis=0)
+    shape = (trajectory.intervals, _PLACES_BETWEEN.size)
+    angles = _angle_excess(walker, between).reshape(shape).max(axis=1)
+    return angles, np.maximum(0.0, dips).reshape(shape).max(axis=1)
+
+
+def _angle_excess(walker: WalkerParameters, states: FloatArray) -> FloatArray:
+    """Return how far hips and knees are beyond their limits in [rad], (N,), states being (12, N)."""
+    hips, knees = states[[2, 4]], states[[3, 5]]
+    excess = np.concatenate([np.abs(hips) - walker.hip_angle_limit, -knees, knees - np.pi])
+    return np.maximum(0.0, excess.max(axis=0))
