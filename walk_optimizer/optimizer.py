@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 from walk_optimizer.certificate import certify, landing_distance
 from walk_optimizer.contact.schedule import CONTACT_FAMILIES
-from walk_optimizer.gait import Certificate, Gait, Trajectory
+from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.gait import Certificate, CertificateEntry, Gait, Trajectory
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.search import Candidate, Search, distinct
@@ -18,6 +19,9 @@ from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import SolverSettings, solver_settings
 from walk_optimizer.solve.status import FamilyViolation, ProgressCallback, SolveReport, Status
 from walk_optimizer.starts import kinematic_starts
+
+# A residual of more than so many tolerances is not merely short of convergence.
+_FAR = 1000.0
 
 
 @dataclass(frozen=True)
@@ -49,16 +53,25 @@ def optimize(
         request: Speed, step, spring mode and grid.
         walker: The walker.
         settings: Of the search; the packaged ones by default.
-        time_limit: In [s]; the settings' by default.
+        time_limit: In [s], above 0; the settings' by default.
         progress: Called at every iteration; returning False cancels the solve.
         seeds: Gaits of neighbouring requests to continue from.
         from_scratch: Whether to search from kinematic guesses too.
 
     Returns:
-        The gait and the report. A solve that fails gives no gait and raises nothing.
+        The gait and the report. A solve that fails gives no gait and raises nothing. A time limit that
+        interrupts no more than the search for other contacts gives the gait found before.
+
+    Raises:
+        InvalidRequestError: the time limit is not above 0, or there is nothing to start from.
     """
     settings = settings or solver_settings()
-    session = SolveSession(settings, time_limit or settings.time_limit, progress)
+    limit = settings.time_limit if time_limit is None else time_limit
+    if not limit > 0:
+        raise InvalidRequestError(f"time limit is {limit} s, allowed is above 0")
+    if not (from_scratch or seeds):
+        raise InvalidRequestError("nothing to start from: give seeds, or search from scratch")
+    session = SolveSession(settings, limit, progress)
     return _Pipeline(request, walker, settings, session).run(seeds, from_scratch=from_scratch)
 
 
@@ -74,12 +87,17 @@ class _Pipeline:
 
     def run(self, seeds: Sequence[Gait], *, from_scratch: bool) -> Outcome:
         """Return the best certified gait, or the report of why there is none."""
+        if self.request.step_length > self.walker.longest_step:
+            return self._out_of_reach()
         candidates = self._from_kinematics() if from_scratch else []
         candidates += self._from_seeds(seeds)
         optima = distinct(candidates)
         if self.session.verdict is not None or not optima:
             return self._failure(candidates)
-        return self._certified(self.search.with_free_contacts(optima[0]))
+        best = self.search.with_free_contacts(optima[0])
+        if self.session.verdict is Status.CANCELLED:
+            return self._failure(candidates)
+        return self._certified(best)
 
     def _from_kinematics(self) -> list[Candidate]:
         """Return the optima on the requested grid that the kinematic starts lead to."""
@@ -107,7 +125,7 @@ class _Pipeline:
         return [self.search.from_gait(*pair) for pair in pairs if not self.session.stopped]
 
     def _certified(self, best: Candidate) -> Outcome:
-        """Return the gait of a solved candidate, unless its certificate fails or the time was up."""
+        """Return the gait of a solved candidate, unless its certificate fails."""
         trajectory = Trajectory.from_stacked(best.points, self.request.step_time)
         certificate = certify(self.walker, self.request, best.spring, trajectory)
         status = Status.SOLVED if certificate.certified else Status.NOT_CERTIFIED
@@ -117,6 +135,15 @@ class _Pipeline:
         length = landing_distance(self.walker, trajectory)
         gait = Gait(self.walker, self.request, best.spring, trajectory, report, certificate, length)
         return Outcome(gait, report)
+
+    def _out_of_reach(self) -> Outcome:
+        """Return the report of a step that no pose of the legs is long enough for."""
+        report = self._bare_report(Status.INFEASIBLE)
+        reason = (
+            f"the step is {self.request.step_length:.4g} m long, "
+            f"the legs reach {self.walker.longest_step:.4g} m at most"
+        )
+        return Outcome(None, replace(report, message=f"{report.message}; {reason}"))
 
     def _failure(self, candidates: list[Candidate]) -> Outcome:
         """Return the report of a search without any solution, with the violations of its best attempt."""
@@ -133,18 +160,26 @@ class _Pipeline:
         return certify(self.walker, request, candidate.spring, trajectory)
 
     def _report(self, status: Status, candidate: Candidate, certificate: Certificate) -> SolveReport:
-        worst, message = certificate.worst, status.sentence
-        if not worst.met:
-            message += f"; {worst}"
         return replace(
             self._bare_report(status),
-            message=message,
+            message="; ".join([status.sentence, *self._remarks(status, candidate, certificate.worst)]),
             start=f"{candidate.name}, {candidate.contacts}",
             objective=candidate.objective,
             violations=tuple(
                 FamilyViolation(one.family, one.violation, one.unit) for one in certificate.entries
             ),
         )
+
+    def _remarks(self, status: Status, candidate: Candidate, worst: CertificateEntry) -> list[str]:
+        """Return what there is to say beside the status."""
+        remarks = []
+        if status is Status.SOLVED and self.session.stopped:
+            remarks.append("the time limit cut the search for other contacts short")
+        if status is Status.SOLVER_ERROR:
+            remarks.append(f"it says {candidate.detail}")
+        if status is Status.ITERATION_LIMIT and worst.relative > _FAR:
+            remarks.append("no start came near a gait that meets all constraints")
+        return remarks if worst.met else [*remarks, str(worst)]
 
     def _bare_report(self, status: Status) -> SolveReport:
         return SolveReport(

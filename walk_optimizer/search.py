@@ -42,6 +42,7 @@ class Candidate:
         points: All grid points in SI units, (23, N).
         spring: K and q_eq.
         status: How its last solve ended.
+        detail: The same in the solver's own words.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Candidate:
     points: FloatArray
     spring: KneeSpring
     status: Status
+    detail: str = ""
 
     @property
     def solved(self) -> bool:
@@ -114,11 +116,14 @@ class Search:
 
         The contacts found are solved once more as a fixed schedule, so that every product of the
         result is zero and not merely small. That also decides whether they are worth having, so
-        the relaxed problem itself need not have converged.
+        the relaxed problem itself need not have converged. Once the session is stopped nothing more
+        is tried.
         """
         start = replace(best, points=self._with_slip_speeds(best.points))
         problem = complementarity_problem(self.request, self.walker, self.relaxation)
         relaxed = self._solve(problem, start, "complementarity", barrier=_NEAR)
+        if self.session.stopped:
+            return start
         parts = (relaxed.points[rows] for rows in (layout.Q, layout.P, layout.REACTION))
         schedule = schedule_of(self.walker, *parts)
         found = self._with_schedule(replace(relaxed, contacts="found"), schedule, "polish", barrier=_NEAR)
@@ -138,7 +143,7 @@ class Search:
         start = to_scaled(self.walker, guess.points, guess.spring)
         solution = self.session.solve(problem, start, stage, objective_unit=unit, barrier=barrier)
         points, spring = from_scaled(self.walker, solution.x)
-        return replace(guess, points=points, spring=spring, status=solution.status)
+        return replace(guess, points=points, spring=spring, status=solution.status, detail=solution.detail)
 
     def _with_slip_speeds(self, points: FloatArray) -> FloatArray:
         """Return the points with gamma = |slip|, the least that eqs. (5c) and (5d) allow."""

@@ -1,15 +1,19 @@
 """Searches that end without a gait say why, and which constraints were not met."""
 
+import math
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import pytest
 
-from walk_optimizer.errors import WalkOptimizerError
+from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.optimizer import optimize
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.solve import session as session_module
 from walk_optimizer.solve.settings import solver_settings
+from walk_optimizer.solve.solution import Solution
 from walk_optimizer.solve.status import Status
 
 REQUEST = GaitRequest.for_speed(0.42, "none", 25)
@@ -25,9 +29,10 @@ def assert_names_worst_family(report):
     assert named[0].violation > 0
 
 
-def test_a_walker_that_can_not_spread_its_legs_far_enough():
-    # Hips turn by 0.3 rad at most: feet are never further apart than 2 sin(0.3) = 0.59 m.
-    walker, request = WalkerParameters(hip_angle_limit=0.3), GaitRequest.for_step(0.9, 0.9, "none", 20)
+def test_a_walker_that_can_not_shorten_its_legs():
+    # Shanks of 2 cm: the swing foot does not come past the stance foot.
+    walker = WalkerParameters(upper_leg_length=0.98, lower_leg_length=0.02, hip_angle_limit=0.47)
+    request = GaitRequest.for_step(0.9, 0.9, "none", 20)
     settings = replace(solver_settings(), maximum_iterations=60)
     outcome = optimize(request, walker, settings=settings)
     assert outcome.gait is None
@@ -36,13 +41,15 @@ def test_a_walker_that_can_not_spread_its_legs_far_enough():
     assert outcome.report.starts == 3
 
 
-@pytest.mark.filterwarnings("default::RuntimeWarning")
-@pytest.mark.xfail(reason="the kinematic guess has no value for steps longer than both legs", strict=True)
 def test_a_step_longer_than_both_legs_is_out_of_reach_and_no_fault_of_the_model(walker):
     request = GaitRequest.for_step(2.2, 1.9, "none", 20)
     report = optimize(request, walker).report
     assert report.status is Status.INFEASIBLE
-    assert "nan" not in report.message
+    assert report.message.endswith("the step is 2.2 m long, the legs reach 2 m at most")
+    assert report.iterations == 0
+    stiff_hips = optimize(GaitRequest.for_step(0.9, 0.9), WalkerParameters(hip_angle_limit=0.3)).report
+    assert stiff_hips.status is Status.INFEASIBLE
+    assert stiff_hips.message.endswith("the step is 0.9 m long, the legs reach 0.591 m at most")
 
 
 def test_the_iteration_limit(walker):
@@ -50,6 +57,7 @@ def test_the_iteration_limit(walker):
     assert outcome.gait is None
     assert outcome.report.status is Status.ITERATION_LIMIT
     assert outcome.report.iterations == 4 * outcome.report.starts
+    assert "no start came near a gait that meets all constraints" in outcome.report.message
     assert_names_worst_family(outcome.report)
 
 
@@ -61,13 +69,16 @@ def test_the_time_limit(walker):
     assert_names_worst_family(outcome.report)
 
 
-@pytest.mark.xfail(reason="limits are not validated: 0 is taken for the default", strict=True)
-def test_a_time_limit_of_nothing_is_refused_or_kept(walker):
-    try:
-        status = optimize(REQUEST, walker, time_limit=0.0).report.status
-    except WalkOptimizerError:
-        return
-    assert status is Status.TIME_LIMIT
+@pytest.mark.parametrize("limit", [0.0, -1.0, math.nan])
+def test_impossible_time_limits(walker, limit):
+    with pytest.raises(InvalidRequestError) as refusal:
+        optimize(REQUEST, walker, time_limit=limit)
+    assert str(refusal.value) == f"time limit is {limit} s, allowed is above 0"
+
+
+def test_a_search_without_starts_is_refused(walker):
+    with pytest.raises(InvalidRequestError, match="nothing to start from: give seeds"):
+        optimize(REQUEST, walker, from_scratch=False)
 
 
 def cancelled_in(stage, walker):
@@ -82,11 +93,42 @@ def test_cancelling(stage, walker):
     assert outcome.report.message.startswith("cancelled by the caller")
 
 
-@pytest.mark.xfail(reason="the last two stages do not look whether they were stopped", strict=True)
-def test_cancelling_the_last_stages(walker):
-    outcome = cancelled_in("complementarity", walker)
+@pytest.mark.parametrize("stage", ["complementarity", "polish"])
+def test_cancelling_the_last_stages(walker, stage):
+    stages = []
+    outcome = optimize(
+        REQUEST, walker, progress=lambda progress: stages.append(progress.stage) or progress.stage != stage
+    )
     assert outcome.gait is None
     assert outcome.report.status is Status.CANCELLED
+    assert outcome.report.message == "cancelled by the caller"
+    assert stages.count(stage) == 1
+    assert stages[-1] == stage
+
+
+def test_a_time_limit_in_the_last_stages_leaves_the_gait_found_before(walker, monkeypatch):
+    clock = SimpleNamespace(now=0.0)
+    monkeypatch.setattr(session_module, "time", SimpleNamespace(monotonic=lambda: clock.now))
+
+    def progress(state):
+        # Late from the first iteration of the stage on.
+        clock.now = 1e6 if state.stage == "complementarity" else 0.0
+        return True
+
+    outcome = optimize(REQUEST, walker, progress=progress)
+    assert outcome.report.status is Status.SOLVED
+    assert outcome.report.message.endswith("; the time limit cut the search for other contacts short")
+    assert outcome.gait.certificate.certified
+
+
+def test_a_failure_of_the_solver_is_told_in_its_own_words(walker, monkeypatch):
+    def failing(problem, start, options, monitor):
+        return Solution(Status.SOLVER_ERROR, start, 0.0, 0.0, 0, "Internal_Error")
+
+    monkeypatch.setattr(session_module.ipopt, "solve", failing)
+    report = optimize(REQUEST, walker).report
+    assert report.status is Status.SOLVER_ERROR
+    assert "; it says Internal_Error; " in report.message
 
 
 def test_progress_runs_through_the_stages_and_ends_at_the_cost_of_the_gait(walker):
