@@ -106,13 +106,13 @@ def test_the_spring_is_part_of_the_dynamics(solved):
     stiffer = KneeSpring(solved.spring.stiffness + 0.5, solved.spring.equilibrium)
     assert "dynamics" in failures(solved, spring=stiffer) <= {"dynamics", "periodicity_force"}
     flexed = KneeSpring(solved.spring.stiffness, solved.spring.equilibrium - 0.01)
-    assert failures(solved, spring=flexed) == {"dynamics", "periodicity_force"}
+    assert failures(solved, spring=flexed) == {"dynamics", "periodicity_force", "equilibrium_limits"}
 
 
 def test_limits_of_the_walker_that_the_gait_is_held_against(solved):
     for limits, expected in (
         ({"hip_angle_limit": 0.05}, {"joint_limits"}),
-        ({"stiffness_limit": solved.spring.stiffness - 1}, {"spring_limits"}),
+        ({"stiffness_limit": solved.spring.stiffness - 1}, {"stiffness_limits"}),
         ({"friction_coefficient": 0.01}, {"friction_cone"}),
     ):
         assert failures(solved, walker=replace(solved.walker, **limits)) == expected
@@ -138,7 +138,6 @@ def test_what_is_not_a_finite_number_fails(solved, row, value):
         assert failures(solved, points)
 
 
-@pytest.mark.xfail(reason="max() drops what is not a number", strict=True)
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_slack_that_is_not_a_finite_number_fails(solved, value):
     points = solved.points.copy()
@@ -152,8 +151,14 @@ def test_a_spring_that_is_not_a_number_fails(solved, spring):
     assert failures(solved, spring=spring)
 
 
-@pytest.mark.xfail(reason="only the widest bounds of the spring are checked, whatever the mode", strict=True)
 def test_a_mode_without_springs_has_none(solved):
     assert solved.spring.stiffness > 1
     plain = replace(solved.request, spring_mode=SpringMode.NONE)
-    assert "spring_limits" in failures(solved, request=plain)
+    assert failures(solved, request=plain) == {"stiffness_limits"}
+
+
+def test_a_mode_that_may_choose_the_equilibrium_may_choose_it_within_limits(solved):
+    free = replace(solved.request, spring_mode=SpringMode.STIFFNESS_AND_EQUILIBRIUM)
+    for equilibrium, expected in ((1.0, False), (-0.1, True), (3.2, True)):
+        failed = failures(solved, request=free, spring=KneeSpring(solved.spring.stiffness, equilibrium))
+        assert ("equilibrium_limits" in failed) == expected

@@ -121,7 +121,12 @@ def test_units_and_tolerances_of_the_families():
     entries = {entry.family: entry for entry in certify(WALKER, REQUEST, SPRING, trajectory).entries}
     weight = 1e-6 * WALKER.weight
     for family, unit, tolerance in (
-        ("dynamics", "N", weight),
+        ("kinematics", "m/s, rad/s", 1e-6),
+        ("dynamics", "N, N m", weight),
+        ("periodicity_force", "N, N m", weight),
+        ("speed", "m/s", 1e-6),
+        ("stiffness_limits", "N m/rad", 1e-6 * WALKER.stiffness_limit),
+        ("equilibrium_limits", "rad", 1e-6),
         ("friction_cone", "N", weight),
         ("penetration", "m", 1e-6),
         ("normal_complementarity", "N m", weight),
