@@ -11,7 +11,7 @@ from pathlib import Path
 
 from walk_optimizer.errors import GaitFileError, GaitNotFoundError, InvalidRequestError
 from walk_optimizer.gait import Gait
-from walk_optimizer.gait_files import SUFFIX, GaitFile, gait_file_name, read_gait_file, write_gait_file
+from walk_optimizer.gait_files import SUFFIX, gait_file_name, read_gait_file, write_gait_file
 from walk_optimizer.gait_files.access import writable_folder
 from walk_optimizer.library_entries import GaitSummary, LibraryEntry, Source, summarize, table_order
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
@@ -155,7 +155,7 @@ class GaitLibrary:
             raise GaitFileError("the gait is for another walker than the library")
         writable_folder(self.folder, self._create)
         path = self.folder / gait_file_name(gait)
-        write_gait_file(GaitFile(gait), path)
+        write_gait_file(gait, path)
         entries = {e.path.name: e for e in self._entries if e.path != path}
         _keep_better(entries, LibraryEntry(gait, Source.CACHE, path))
         self._entries = tuple(sorted(entries.values(), key=table_order))
@@ -187,7 +187,7 @@ def _gait_files(walker: WalkerParameters, folder: Path) -> list[tuple[Path, Sour
 
 def _read_entry(path: Path, source: Source, walker: WalkerParameters) -> LibraryEntry:
     """Return the gait of a file; raise GaitFileError when it can't be served."""
-    gait = read_gait_file(path, walker).gait
+    gait = read_gait_file(path, walker)
     if not gait.certificate.certified:
         raise GaitFileError(f"{path}: the gait is not certified")
     return LibraryEntry(gait, source, path)

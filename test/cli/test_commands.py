@@ -13,7 +13,7 @@ from cli.console import command, environment, walk_optimizer
 from library.made_up_gait import made_up_gait
 
 from walk_optimizer.gait_csv import COLUMNS, gait_csv
-from walk_optimizer.gait_files import GaitFile, gait_file_name, write_gait_file
+from walk_optimizer.gait_files import gait_file_name, write_gait_file
 from walk_optimizer.library import cache_folder
 from walk_optimizer.model.parameters import WalkerParameters
 
@@ -148,7 +148,7 @@ def cached(tmp_path, monkeypatch):
     gait = made_up_gait(speed=float(OFF_TABLE), mode="stiffness", points=200)
     folder = cache_folder(WalkerParameters())
     folder.mkdir(parents=True)
-    write_gait_file(GaitFile(gait), folder / gait_file_name(gait))
+    write_gait_file(gait, folder / gait_file_name(gait))
     return gait
 
 
@@ -185,7 +185,7 @@ def test_csv_reads_back_exactly(tmp_path, cached):
 
 def test_a_file_can_be_named_instead(tmp_path, cached):
     path = tmp_path / "gait.npz"
-    write_gait_file(GaitFile(cached), path)
+    write_gait_file(cached, path)
     output = tmp_path / "gait.csv"
     done = walk_optimizer("export", "--file", path, "--output", output, home=tmp_path)
     assert (done.returncode, done.stdout) == (0, f"exported to {output}\n")

@@ -7,7 +7,7 @@ import pytest
 from cli.console import walk_optimizer
 from library.made_up_gait import all_modes, made_up_gait
 
-from walk_optimizer.gait_files import GaitFile, gait_file_name, write_gait_file
+from walk_optimizer.gait_files import gait_file_name, write_gait_file
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.reproduction import count_dents, sparsity
 from walk_optimizer.request import gait_table_settings
@@ -23,7 +23,7 @@ def folder(tmp_path):
     for mode, torque in zip(all_modes(), (1e-3, 8e-4, 5e-4), strict=True):
         for speed in gait_table_settings().table_speeds():
             gait = made_up_gait(speed=speed, mode=mode, points=200, torque=torque)
-            write_gait_file(GaitFile(gait), place / gait_file_name(gait))
+            write_gait_file(gait, place / gait_file_name(gait))
     return place
 
 

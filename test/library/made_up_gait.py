@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from walk_optimizer.gait import Certificate, CertificateEntry, Gait, Trajectory
+from walk_optimizer.gait import Certificate, CertificateEntry, FloatArray, Gait, RefinedGait, Trajectory
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
+from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import FamilyViolation, SolveReport, Status
+from walk_optimizer.transcription.tableau import NODES_WITH_START
 
 
 def made_up_gait(
@@ -59,33 +61,59 @@ def all_modes() -> list[str]:
     return [mode.value for mode in SpringMode]
 
 
+def with_refinement(gait: Gait, certified: bool = True, intervals: int = 5) -> Gait:
+    """Return the gait with a refined part: the same motion and twice the torques, on uneven intervals."""
+    breaks = gait.request.step_time * np.linspace(0, 1, intervals + 1) ** 1.5
+    places = breaks[:-1, None] + np.diff(breaks)[:, None] * NODES_WITH_START
+    phase = places.ravel() / gait.request.step_time
+    q, p = _motion(gait.request, gait.walker, phase)
+    impulses = np.zeros((intervals, 4))
+    impulses[0] = [-3.0, 9.0, 0.0, 0.0]
+    trajectory = RefinedTrajectory(
+        breaks=breaks,
+        states=np.vstack([q, p]).T.reshape(intervals, 4, 12),
+        torques=2 * _torques(phase).T.reshape(intervals, 4, 3)[:, 1:],
+        forces=np.tile([5.0, gait.walker.weight, 0.0, 0.0], (intervals, 3, 1)),
+        impulses=impulses,
+    )
+    certificate = Certificate((CertificateEntry("collocation", 1e-9 if certified else 0.5, "N", 1e-6),))
+    spring = KneeSpring(gait.spring.stiffness, gait.spring.equilibrium)
+    return replace(gait, refined=RefinedGait(trajectory, spring, gait.step_length, certificate))
+
+
 def _trajectory(request: GaitRequest, walker: WalkerParameters, torque: float) -> Trajectory:
-    """Return a stiff stance leg that turns over its foot, and a swing leg that bends its knee."""
-    points, length = request.points, walker.leg_length
-    phase = np.arange(1, points + 1) / points
+    """Return the made-up motion on the grid of a request."""
+    phase = np.arange(1, request.points + 1) / request.points
+    q, p = _motion(request, walker, phase)
+    wave = np.sin(2 * np.pi * phase)
+    weight, zero = np.full(request.points, walker.weight), np.zeros(request.points)
+    return Trajectory(
+        time=request.interval * np.arange(1, request.points + 1),
+        q=q,
+        p=p,
+        u=torque * _torques(phase),
+        reaction=np.array([np.maximum(wave, 0) * 20, np.maximum(-wave, 0) * 20, weight, zero, zero, zero]),
+        slip_speed=np.array([zero, np.abs(np.sin(np.pi * phase))]),
+    )
+
+
+def _torques(phase: FloatArray) -> FloatArray:
+    """Return torques at phases of the step, (3, N)."""
+    wave = np.sin(2 * np.pi * phase)
+    return np.array([2 * wave, 0.5 * wave, -wave])
+
+
+def _motion(
+    request: GaitRequest, walker: WalkerParameters, phase: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return q and p of a stiff stance leg that turns over its foot, and of a swing leg that bends."""
+    length = walker.leg_length
     reach = np.arcsin(request.step_length / 2 / length)
     stance = reach * (1 - 2 * phase)
     bend = 0.6 * np.sin(np.pi * phase) ** 2
     swing = reach * (2 * phase - 1) + bend / 2
-    straight = np.full(points, np.pi)
-    q = np.array(
-        [
-            -length * np.sin(stance),
-            length * np.cos(stance),
-            stance,
-            straight,
-            swing,
-            np.pi - bend,
-        ]
-    )
+    straight = np.full(phase.size, np.pi)
+    hip = [-length * np.sin(stance), length * np.cos(stance)]
+    q = np.array([*hip, stance, straight, swing, np.pi - bend])
     wave = np.sin(2 * np.pi * phase)
-    weight = np.full(points, walker.weight)
-    zero = np.zeros(points)
-    return Trajectory(
-        time=request.interval * np.arange(1, points + 1),
-        q=q,
-        p=np.vstack([np.full(points, 75.0 * request.speed), *[0.1 * wave] * 5]),
-        u=torque * np.array([2 * wave, 0.5 * wave, -wave]),
-        reaction=np.array([np.maximum(wave, 0) * 20, np.maximum(-wave, 0) * 20, weight, zero, zero, zero]),
-        slip_speed=np.array([zero, np.abs(np.sin(np.pi * phase))]),
-    )
+    return q, np.vstack([np.full(phase.size, 75.0 * request.speed), *[0.1 * wave] * 5])

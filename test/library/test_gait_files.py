@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from library.made_up_gait import made_up_gait
+from library.made_up_gait import made_up_gait, with_refinement
 
 from walk_optimizer.errors import GaitFileError
-from walk_optimizer.gait import Gait, Trajectory
-from walk_optimizer.gait_files import GaitFile, gait_file_name, read_gait_file, write_gait_file
+from walk_optimizer.gait import Gait, RefinedGait, Trajectory
+from walk_optimizer.gait_files import gait_file_name, read_gait_file, write_gait_file
 from walk_optimizer.gait_files.codec import LARGEST_FILE, decode, encode
 from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.refined_trajectory import RefinedTrajectory
 
 
 def assert_same(found: Gait, expected: Gait) -> None:
@@ -27,6 +28,16 @@ def assert_same(found: Gait, expected: Gait) -> None:
         np.testing.assert_array_equal(getattr(found.trajectory, name), getattr(expected.trajectory, name))
     # NaN is not equal to itself.
     assert repr(found.report) == repr(expected.report)
+    assert (found.refined is None) == (expected.refined is None)
+    if found.refined is not None and expected.refined is not None:
+        assert_same_refinement(found.refined, expected.refined)
+
+
+def assert_same_refinement(found: RefinedGait, expected: RefinedGait) -> None:
+    for name in ("spring", "step_length", "certificate"):
+        assert getattr(found, name) == getattr(expected, name)
+    for name in (entry.name for entry in fields(RefinedTrajectory)):
+        np.testing.assert_array_equal(getattr(found.trajectory, name), getattr(expected.trajectory, name))
 
 
 def arrays_of(data: bytes) -> dict[str, np.ndarray]:
@@ -62,25 +73,29 @@ def with_arrays(data: bytes, change) -> bytes:
 def test_what_is_written_is_read(tmp_path, mode):
     gait = made_up_gait(mode=mode)
     path = tmp_path / gait_file_name(gait)
-    write_gait_file(GaitFile(gait), path)
-    found = read_gait_file(path, WalkerParameters()).gait
+    write_gait_file(gait, path)
+    found = read_gait_file(path, WalkerParameters())
     assert_same(found, gait)
     assert not found.trajectory.q.flags.writeable
     assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
 
 
-def test_a_second_representation_travels_along(tmp_path):
-    refined = {"time": np.linspace(0, 1, 7), "q": np.ones((6, 7))}
+def test_the_refined_part_travels_along(tmp_path):
+    gait = with_refinement(made_up_gait(mode="stiffness"))
     path = tmp_path / "gait.npz"
-    write_gait_file(GaitFile(made_up_gait(), refined, {"method": "radau", "intervals": 3}), path)
-    found = read_gait_file(path)
-    assert set(found.refined) == {"time", "q"}
-    np.testing.assert_array_equal(found.refined["q"], refined["q"])
-    assert found.refined_header == {"method": "radau", "intervals": 3}
+    write_gait_file(gait, path)
+    assert_same(read_gait_file(path), gait)
+
+
+def test_files_of_version_1_without_a_refined_part_are_read():
+    def as_before(header):
+        header["refined"] = {}
+
+    assert decode(with_header(encode(made_up_gait()), as_before)).refined is None
 
 
 def test_equal_gaits_give_equal_bytes():
-    assert encode(GaitFile(made_up_gait())) == encode(GaitFile(made_up_gait()))
+    assert encode(made_up_gait()) == encode(made_up_gait())
 
 
 def test_the_name_tells_requests_and_walkers_apart():
@@ -98,7 +113,7 @@ def test_the_name_tells_requests_and_walkers_apart():
 # ---------------------------------------------------------------- damage
 
 
-WHOLE = encode(GaitFile(made_up_gait(), {"time": np.linspace(0, 1, 5)}))
+WHOLE = encode(with_refinement(made_up_gait()))
 
 
 @settings(deadline=None, max_examples=150)
@@ -124,8 +139,7 @@ def test_a_flipped_byte_is_refused_or_harmless(place, flip):
     except GaitFileError:
         return
     # Some bytes of the archive format carry nothing, e.g. dates.
-    assert_same(found.gait, made_up_gait())
-    np.testing.assert_array_equal(found.refined["time"], np.linspace(0, 1, 5))
+    assert_same(found, with_refinement(made_up_gait()))
 
 
 @settings(deadline=None, max_examples=100)
@@ -161,7 +175,11 @@ def test_noise_is_refused(noise):
         (lambda h: h["certificate"].update(entries=3), "certificate.entries is 3, expected a list"),
         (lambda h: h["certificate"]["entries"][0].pop("unit"), "certificate.entries[0] has no entry unit"),
         (lambda h: h.update(step_length=0), "step_length is 0"),
-        (lambda h: h.update(refined=[]), "refined is no mapping"),
+        (lambda h: h.update(refined=[]), "refined is [], expected a mapping"),
+        (lambda h: h.update(refined=None), "unknown arrays: refined_breaks, refined_forces"),
+        (lambda h: h["refined"].update(colour="red"), "refined has unknown entries: colour"),
+        (lambda h: h["refined"].update(step_length=0.0), "refined.step_length is 0.0, expected a finite"),
+        (lambda h: h["refined"]["certificate"].pop("entries"), "refined.certificate has no entry entries"),
         (lambda h: h.update(walker=[]), "walker is [], expected a mapping"),
     ],
 )
@@ -174,6 +192,15 @@ def test_a_wrong_header_is_refused_by_name(change, message):
 def not_a_number(arrays):
     arrays["q"] = arrays["q"].copy()
     arrays["q"][2, 5] = np.nan
+
+
+def refined_times(change):
+    """Return what changes the breaks of the refined part."""
+
+    def changed(arrays):
+        arrays["refined_breaks"] = change(arrays["refined_breaks"].copy())
+
+    return changed
 
 
 def standing_clock(arrays):
@@ -190,10 +217,20 @@ def standing_clock(arrays):
         (lambda a: a.update(extra=np.zeros(3)), "missing or unknown arrays: extra"),
         (lambda a: a.update(u=a["u"][:, :-1]), "array u has the shape (3, 19), expected (3, 20)"),
         (lambda a: a.update(u=a["u"].astype(np.float32)), "u.npy holds float32"),
+        (lambda a: a.pop("refined_forces"), "missing or unknown arrays: refined_forces"),
+        (lambda a: a.update(refined_q=np.zeros(3)), "missing or unknown arrays: refined_q"),
         (
-            lambda a: a.update(refined_q=np.array([np.inf])),
-            "array refined_q has 1 values",
+            lambda a: a.update(refined_states=a["refined_states"][:-1]),
+            "array refined_states has the shape (4, 4, 12), expected (5, 4, 12)",
         ),
+        (
+            lambda a: a.update(refined_impulses=np.full((5, 4), np.inf)),
+            "array refined_impulses has 20 values that are not finite",
+        ),
+        (refined_times(lambda t: t[::-1]), "array refined_breaks does not increase"),
+        (refined_times(lambda t: t[:1]), "array refined_breaks has the shape (1,), expected (2,)"),
+        (refined_times(lambda t: 2 * t), "refined_breaks leads from 0 s to 1.57 s, expected 0 to 0.785 s"),
+        (refined_times(lambda t: t[:, None]), "array refined_breaks has the shape (6, 1), expected (6,)"),
         (lambda a: a.update({f"refined_{i}": np.zeros(1) for i in range(80)}), "arrays, allowed are 64"),
     ],
 )
@@ -259,7 +296,7 @@ def test_messages_begin_with_the_path(tmp_path):
 
 def test_another_walker_is_named_by_its_differences(tmp_path):
     path = tmp_path / "gait.npz"
-    write_gait_file(GaitFile(made_up_gait()), path)
+    write_gait_file(made_up_gait(), path)
     with pytest.raises(GaitFileError, match=r"for another walker: hip_mass is 45\.0, expected 40\.0"):
         read_gait_file(path, WalkerParameters(hip_mass=40.0))
 
@@ -282,22 +319,22 @@ def test_a_number_that_is_not_finite_is_not_written(tmp_path):
     path = tmp_path / "gait.npz"
     trajectory = replace(gait.trajectory, u=np.full_like(gait.trajectory.u, np.nan))
     with pytest.raises(GaitFileError, match=r"gait\.npz: array u has 60 values"):
-        write_gait_file(GaitFile(replace(gait, trajectory=trajectory)), path)
+        write_gait_file(replace(gait, trajectory=trajectory), path)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_failed_write_leaves_the_former_file(tmp_path, monkeypatch):
     path = tmp_path / "gait.npz"
-    write_gait_file(GaitFile(made_up_gait()), path)
+    write_gait_file(made_up_gait(), path)
 
     def full(descriptor):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(GaitFileError, match="can't be written: No space left on device"):
-        write_gait_file(GaitFile(made_up_gait(torque=2.0)), path)
+        write_gait_file(made_up_gait(torque=2.0), path)
     monkeypatch.undo()
-    assert_same(read_gait_file(path).gait, made_up_gait())
+    assert_same(read_gait_file(path), made_up_gait())
     assert [entry.name for entry in tmp_path.iterdir()] == ["gait.npz"]
 
 
@@ -305,4 +342,4 @@ def test_an_entry_that_is_newer_than_the_file_takes_its_default():
     def forget(header):
         header["report"].pop("starts")
 
-    assert decode(with_header(WHOLE, forget)).gait.report.starts == 0
+    assert decode(with_header(WHOLE, forget)).report.starts == 0

@@ -13,7 +13,7 @@ from library.made_up_gait import all_modes, made_up_gait
 
 from walk_optimizer import library as library_module
 from walk_optimizer.errors import GaitFileError, GaitNotFoundError, InvalidRequestError
-from walk_optimizer.gait_files import GaitFile, gait_file_name, write_gait_file
+from walk_optimizer.gait_files import gait_file_name, write_gait_file
 from walk_optimizer.library import GaitLibrary, Source, cache_folder
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 
@@ -40,7 +40,7 @@ def folder(tmp_path):
 def put(folder: Path, **what) -> Path:
     gait = made_up_gait(**what)
     path = folder / gait_file_name(gait)
-    write_gait_file(GaitFile(gait), path)
+    write_gait_file(gait, path)
     return path
 
 
@@ -235,11 +235,11 @@ WRITER = """
 import sys
 from pathlib import Path
 from library.made_up_gait import made_up_gait
-from walk_optimizer.gait_files import GaitFile, gait_file_name, write_gait_file
+from walk_optimizer.gait_files import gait_file_name, write_gait_file
 gait = made_up_gait(points=200)
 print("go", flush=True)
 while True:
-    write_gait_file(GaitFile(gait), Path(sys.argv[1]) / gait_file_name(gait))
+    write_gait_file(gait, Path(sys.argv[1]) / gait_file_name(gait))
 """
 
 

@@ -39,7 +39,7 @@ def chosen_gait(args: argparse.Namespace) -> Gait:
     """
     walker = walker_from(args)
     if args.file is not None:
-        return read_gait_file(args.file, walker if args.walker else None).gait
+        return read_gait_file(args.file, walker if args.walker else None)
     if args.speed is None:
         raise InvalidRequestError("say which gait: --speed SPEED [--spring MODE], or --file GAIT")
     request = request_from(args)

@@ -96,14 +96,14 @@ class BuildDisplay:
 
 def store_better(gait: "Gait", folder: Path) -> bool:
     """Write a gait, unless the folder holds a certified one of the same request with no larger F."""
-    from walk_optimizer.gait_files import GaitFile, gait_file_name, write_gait_file
+    from walk_optimizer.gait_files import gait_file_name, write_gait_file
     from walk_optimizer.verification import verify_file
 
     path = folder / gait_file_name(gait)
     former = verify_file(path, gait.walker)
     if former.passed and former.gait is not None and former.gait.objective <= gait.objective:
         return False
-    write_gait_file(GaitFile(gait), path)
+    write_gait_file(gait, path)
     return True
 
 

@@ -4,7 +4,6 @@ Owns the bytes of a file and how they reach the disk. Does not own which folder 
 gait answers a request: that is the library's.
 """
 
-from walk_optimizer.gait_files.codec import GaitFile
 from walk_optimizer.gait_files.files import SUFFIX, gait_file_name, read_gait_file, write_gait_file
 
-__all__ = ["SUFFIX", "GaitFile", "gait_file_name", "read_gait_file", "write_gait_file"]
+__all__ = ["SUFFIX", "gait_file_name", "read_gait_file", "write_gait_file"]

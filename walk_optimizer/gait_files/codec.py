@@ -4,7 +4,7 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from walk_optimizer import __version__
 from walk_optimizer.errors import GaitFileError, InvalidRequestError
-from walk_optimizer.gait import Certificate, FloatArray, Gait, Trajectory
+from walk_optimizer.gait import Certificate, Gait, Trajectory
 from walk_optimizer.gait_files.archive import read_archive
+from walk_optimizer.gait_files.checks import check_finite, check_shape, positive
 from walk_optimizer.gait_files.header import from_plain, to_plain
+from walk_optimizer.gait_files.refined import REFINED_PREFIX, refined_arrays, refined_from, refined_header
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import SolveReport
@@ -23,7 +25,6 @@ FORMAT = "walk_optimizer.gait"
 VERSION = 1
 # 2000 points take 0.4 MB; a file above this is no gait, whatever its header says.
 LARGEST_FILE = 16 * 1024 * 1024
-REFINED_PREFIX = "refined_"
 _HEADER = "header"
 _HEADER_ENTRIES = {"format", "version", "software", "checksum", "walker", "request", "spring"} | {
     "report",
@@ -34,29 +35,12 @@ _HEADER_ENTRIES = {"format", "version", "software", "checksum", "walker", "reque
 _ROWS = {"q": 6, "p": 6, "u": 3, "reaction": 6, "slip_speed": 2}
 
 
-@dataclass(frozen=True, eq=False)
-class GaitFile:
-    """What a gait file holds.
-
-    Attributes:
-        gait: The gait on the report's grid.
-        refined: Arrays of a second, more accurate representation, by name without prefix; empty
-            when there is none.
-        refined_header: What describes them, plain JSON values.
-    """
-
-    gait: Gait
-    refined: Mapping[str, FloatArray] = field(default_factory=dict)
-    refined_header: Mapping[str, Any] = field(default_factory=dict)
-
-
-def encode(content: GaitFile) -> bytes:
+def encode(gait: Gait) -> bytes:
     """Return the bytes of a gait file; equal gaits give equal bytes."""
-    gait = content.gait
     arrays = {name: getattr(gait.trajectory, name) for name in _trajectory_names()}
-    arrays |= {REFINED_PREFIX + name: values for name, values in content.refined.items()}
+    arrays |= refined_arrays(gait.refined)
     for name, values in arrays.items():
-        _check_finite(name, values)
+        check_finite(name, values)
     header = {
         "format": FORMAT,
         "version": VERSION,
@@ -67,7 +51,7 @@ def encode(content: GaitFile) -> bytes:
         "report": to_plain(gait.report),
         "certificate": to_plain(gait.certificate),
         "step_length": gait.step_length,
-        "refined": to_plain(dict(content.refined_header)),
+        "refined": refined_header(gait.refined),
     }
     header["checksum"] = _checksum(header, arrays)
     text = json.dumps(header, indent=1, sort_keys=True, allow_nan=False)
@@ -76,8 +60,8 @@ def encode(content: GaitFile) -> bytes:
     return buffer.getvalue()
 
 
-def decode(data: bytes) -> GaitFile:
-    """Return what the bytes of a gait file hold.
+def decode(data: bytes) -> Gait:
+    """Return the gait that the bytes of a gait file hold.
 
     Raises:
         GaitFileError: the bytes are no whole gait file of this version.
@@ -86,15 +70,7 @@ def decode(data: bytes) -> GaitFile:
     header = _header(arrays.pop(_HEADER, None))
     if header["checksum"] != _checksum(header, arrays):
         raise GaitFileError("damaged: the checksum does not fit the content")
-    return GaitFile(
-        gait=_gait(header, arrays),
-        refined={
-            name.removeprefix(REFINED_PREFIX): values
-            for name, values in arrays.items()
-            if name.startswith(REFINED_PREFIX)
-        },
-        refined_header=header["refined"],
-    )
+    return _gait(header, arrays)
 
 
 def _trajectory_names() -> tuple[str, ...]:
@@ -127,14 +103,14 @@ def _header(values: NDArray[Any] | None) -> dict[str, Any]:
     wrong = sorted(set(header) ^ _HEADER_ENTRIES)
     if wrong:
         raise GaitFileError(f"header has missing or unknown entries: {', '.join(wrong)}")
-    if not isinstance(header["refined"], dict):
-        raise GaitFileError("header entry refined is no mapping")
     return header
 
 
 def _gait(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Gait:
     """Return the gait of a header and its arrays."""
     request = _request(header)
+    for name, values in arrays.items():
+        check_finite(name, values)
     return Gait(
         walker=from_plain(WalkerParameters, header["walker"], "walker"),
         request=request,
@@ -142,7 +118,8 @@ def _gait(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Gait
         trajectory=_trajectory(arrays, request.points),
         report=from_plain(SolveReport, header["report"], "report"),
         certificate=from_plain(Certificate, header["certificate"], "certificate"),
-        step_length=_positive(header["step_length"], "step_length"),
+        step_length=positive(header["step_length"], "step_length"),
+        refined=refined_from(header["refined"], arrays, request.step_time),
     )
 
 
@@ -158,34 +135,14 @@ def _request(header: Mapping[str, Any]) -> GaitRequest:
 
 
 def _trajectory(arrays: Mapping[str, NDArray[Any]], points: int) -> Trajectory:
-    """Return the trajectory after a check of names, types, shapes and values."""
+    """Return the trajectory after a check of names, shapes and times."""
     names = _trajectory_names()
     plain = {name for name in arrays if not name.startswith(REFINED_PREFIX)}
     wrong = sorted(plain ^ set(names))
     if wrong:
         raise GaitFileError(f"missing or unknown arrays: {', '.join(wrong)}")
-    for name, values in arrays.items():
-        _check_finite(name, values)
     for name in names:
-        shape = (points,) if name == "time" else (_ROWS[name], points)
-        if arrays[name].shape != shape:
-            raise GaitFileError(f"array {name} has the shape {arrays[name].shape}, expected {shape}")
+        check_shape(name, arrays[name], (points,) if name == "time" else (_ROWS[name], points))
     if np.any(np.diff(arrays["time"], prepend=0.0) <= 0):
         raise GaitFileError("array time does not increase from above 0")
     return Trajectory(**{name: arrays[name] for name in names})
-
-
-def _check_finite(name: str, values: NDArray[Any]) -> None:
-    """Raise GaitFileError unless all values are finite double precision numbers."""
-    if values.dtype != np.float64:
-        raise GaitFileError(f"array {name} holds {values.dtype}, expected float64")
-    if not np.isfinite(values).all():
-        count = int(np.sum(~np.isfinite(values)))
-        raise GaitFileError(f"array {name} has {count} values that are not finite")
-
-
-def _positive(value: Any, where: str) -> float:
-    """Return a finite number above 0."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < np.inf:
-        raise GaitFileError(f"{where} is {value!r}, expected a finite number above 0")
-    return float(value)

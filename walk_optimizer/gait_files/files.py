@@ -6,7 +6,7 @@ from pathlib import Path
 from walk_optimizer.errors import GaitFileError
 from walk_optimizer.gait import Gait
 from walk_optimizer.gait_files.access import read_limited, replace_file
-from walk_optimizer.gait_files.codec import LARGEST_FILE, GaitFile, decode, encode
+from walk_optimizer.gait_files.codec import LARGEST_FILE, decode, encode
 from walk_optimizer.model.parameters import WalkerParameters
 
 SUFFIX = ".npz"
@@ -21,20 +21,20 @@ def gait_file_name(gait: Gait) -> str:
     )
 
 
-def write_gait_file(content: GaitFile, path: Path) -> None:
+def write_gait_file(gait: Gait, path: Path) -> None:
     """Write a gait file; a crash leaves either the former file or the whole new one.
 
     Raises:
         GaitFileError: the file can't be written, or a number is not finite.
     """
     try:
-        data = encode(content)
+        data = encode(gait)
     except GaitFileError as error:
         raise GaitFileError(f"{path}: {error}") from error
     replace_file(path, data)
 
 
-def read_gait_file(path: Path, walker: WalkerParameters | None = None) -> GaitFile:
+def read_gait_file(path: Path, walker: WalkerParameters | None = None) -> Gait:
     """Read a gait file and check all of it.
 
     Args:
@@ -47,11 +47,11 @@ def read_gait_file(path: Path, walker: WalkerParameters | None = None) -> GaitFi
     """
     data = read_limited(path, LARGEST_FILE)
     try:
-        content = decode(data)
-        _check_walker(content.gait.walker, walker)
+        gait = decode(data)
+        _check_walker(gait.walker, walker)
     except GaitFileError as error:
         raise GaitFileError(f"{path}: {error}") from error
-    return content
+    return gait
 
 
 def _check_walker(found: WalkerParameters, expected: WalkerParameters | None) -> None:
