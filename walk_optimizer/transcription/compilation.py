@@ -7,7 +7,7 @@ import platform
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 
@@ -36,28 +36,60 @@ def compiled(build: Callable[[], list[ca.Function]]) -> dict[str, ca.Function]:
     """
     functions = {function.name(): function for function in build()}
     evaluated = {name: function for name, function in functions.items() if not name.endswith(PATTERN)}
-    compiler = shutil.which(os.environ.get(COMPILER_VARIABLE, "cc") or "no-compiler")
+    compiler = _compiler()
     if compiler is None:
         return functions
     try:
-        library = _shared_library(evaluated, compiler)
-    except (OSError, subprocess.CalledProcessError) as error:
+        return functions | _machine_code(evaluated, compiler)
+    except (OSError, RuntimeError, subprocess.CalledProcessError) as error:
         _LOGGER.warning("C code can't be compiled (%s); CasADi's slower interpreter is used", error)
         return functions
-    return functions | {name: ca.external(name, str(library)) for name in evaluated}
 
 
-def _shared_library(functions: dict[str, ca.Function], compiler: str) -> Path:
-    """Return the shared library of the functions, compiling it unless it is in the cache."""
+def _compiler() -> str | None:
+    """Return the path of the C compiler; None without one, with a warning if one was named."""
+    named = os.environ.get(COMPILER_VARIABLE)
+    if named == "":
+        return None
+    compiler = shutil.which(named or "cc")
+    if named and compiler is None:
+        _LOGGER.warning(
+            "%s is %r, which is no program; CasADi's slower interpreter is used", COMPILER_VARIABLE, named
+        )
+    return compiler
+
+
+def _machine_code(functions: dict[str, ca.Function], compiler: str) -> dict[str, ca.Function]:
+    """Return the functions from their shared library, compiling it if the cache has none that loads.
+
+    Raises:
+        OSError: the cache can't be written, or the compiler made nothing.
+        RuntimeError: what was compiled can't be loaded.
+        CalledProcessError: the compiler failed.
+    """
+    library = _library_path(functions, compiler)
+    if library.is_file():
+        try:
+            return _loaded(functions, library)
+        except RuntimeError:
+            _LOGGER.warning("%s is damaged and is compiled again", library)
+            library.unlink(missing_ok=True)
+    library.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        _compile(functions, compiler, Path(folder), library)
+    return _loaded(functions, library)
+
+
+def _loaded(functions: Iterable[str], library: Path) -> dict[str, ca.Function]:
+    return {name: ca.external(name, str(library)) for name in functions}
+
+
+def _library_path(functions: dict[str, ca.Function], compiler: str) -> Path:
+    """Return the path in the cache that stands for these functions and this compiler."""
     key = hashlib.sha256(" ".join([ca.__version__, platform.machine(), compiler, *_COMPILER_FLAGS]).encode())
     for function in functions.values():
         key.update(function.serialize().encode())
-    library = cache_folder() / f"{next(iter(functions))}-{key.hexdigest()[:24]}.so"
-    if not library.is_file():
-        library.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-            _compile(functions, compiler, Path(folder), library)
-    return library
+    return cache_folder() / f"{next(iter(functions))}-{key.hexdigest()[:24]}.so"
 
 
 def _compile(functions: dict[str, ca.Function], compiler: str, folder: Path, library: Path) -> None:
