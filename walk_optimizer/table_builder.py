@@ -5,9 +5,11 @@ from its neighbours in speed and from the mode with less freedom, until no entry
 left that its neighbour leads to a better optimum of.
 """
 
+import signal
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
+from itertools import product
 from multiprocessing import get_context
 
 from walk_optimizer.gait import Gait
@@ -72,7 +74,7 @@ def build_table(
         processes: Solves that run at a time.
         points: Grid points of a step; the settings' by default.
         modes: Spring modes, each after the ones that it must not be worse than.
-        on_progress: Told after each solve; what it raises ends the build.
+        on_progress: Told after each solve; what it raises ends the build, after the solves that run.
 
     Returns:
         The gaits by speed index and mode; entries without a certified gait are missing.
@@ -80,11 +82,16 @@ def build_table(
     steps = gait_table_settings().table_steps()
     requests = {
         (index, mode): GaitRequest.for_step(length, time, mode, points)
-        for index, (length, time) in enumerate(steps)
-        for mode in modes
+        for (index, (length, time)), mode in product(enumerate(steps), modes)
     }
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    # Ctrl-C in a terminal reaches the processes of the pool too: it is for this one to end them.
+    pool = ProcessPoolExecutor(
+        processes, get_context("spawn"), initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
+    )
+    try:
         return _Builder(walker, requests, pool, on_progress).build()
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 class _Builder:
