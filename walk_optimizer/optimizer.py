@@ -2,7 +2,8 @@
 
 Kinematic guesses are solved with plain single support on a coarse grid; the best distinct optima go
 on to the requested grid with each contact family. The best of all starts the complementarity
-problem, which is free to find other contacts.
+problem, which is free to find other contacts. Its contact phases are then solved once more on an
+accurate grid.
 """
 
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ from walk_optimizer.contact.schedule import CONTACT_FAMILIES
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import Certificate, CertificateEntry, Gait, Trajectory
 from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.refinement import refined_gait
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.search import Candidate, Search, distinct
 from walk_optimizer.solve.session import SolveSession
@@ -46,6 +48,7 @@ def optimize(
     progress: ProgressCallback | None = None,
     seeds: Sequence[Gait] = (),
     from_scratch: bool = True,
+    refine: bool = True,
 ) -> Outcome:
     """Solve for the gait of least torque.
 
@@ -57,6 +60,7 @@ def optimize(
         progress: Called at every iteration; returning False cancels the solve.
         seeds: Gaits of neighbouring requests to continue from.
         from_scratch: Whether to search from kinematic guesses too.
+        refine: Whether to add the accurate solution on a collocation grid.
 
     Returns:
         The gait and the report. A solve that fails gives no gait and raises nothing. A time limit that
@@ -72,7 +76,15 @@ def optimize(
     if not (from_scratch or seeds):
         raise InvalidRequestError("nothing to start from: give seeds, or search from scratch")
     session = SolveSession(settings, limit, progress)
-    return _Pipeline(request, walker, settings, session).run(seeds, from_scratch=from_scratch)
+    outcome = _Pipeline(request, walker, settings, session).run(seeds, from_scratch=from_scratch)
+    if outcome.gait is None or not refine:
+        return outcome
+    refined = refined_gait(outcome.gait, session)
+    if session.verdict is Status.CANCELLED:
+        return Outcome(
+            None, replace(outcome.report, status=session.verdict, message=session.verdict.sentence)
+        )
+    return replace(outcome, gait=replace(outcome.gait, refined=refined))
 
 
 class _Pipeline:
@@ -92,7 +104,7 @@ class _Pipeline:
         candidates = self._from_kinematics() if from_scratch else []
         candidates += self._from_seeds(seeds)
         optima = distinct(candidates)
-        if self.session.verdict is not None or not optima:
+        if self.session.stopped or not optima:
             return self._failure(candidates)
         best = self.search.with_free_contacts(optima[0])
         if self.session.verdict is Status.CANCELLED:
