@@ -7,8 +7,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.gait import Gait, Trajectory, read_only
+from walk_optimizer.gait import Gait, RefinedGait, Trajectory, read_only
 from walk_optimizer.model.kinematics import HIP_X, RELABELLED
+from walk_optimizer.refined_trajectory import RefinedTrajectory
 
 FloatArray = NDArray[np.float64]
 
@@ -30,6 +31,10 @@ class StepSample:
 
 class StepProfile(Protocol):
     """A step that can be sampled at any time; q is continuous, and qdot is its derivative."""
+
+    @property
+    def method(self) -> str:
+        """Name of the method that the gait was solved with."""
 
     @property
     def step_time(self) -> float:
@@ -57,6 +62,8 @@ class EulerProfile:
     on (t_(i-1), t_i] the velocity is (q_i - q_(i-1)) / h, the torque is u_i, and q is linear. The state
     before point 1 is point N relabelled.
     """
+
+    method = "implicit_euler"
 
     def __init__(self, trajectory: Trajectory, step_length: float, step_time: float) -> None:
         """Tabulate the intervals.
@@ -100,6 +107,62 @@ class EulerProfile:
         return StepSample(q, qdot, self._torques[index])
 
 
+class RefinedProfile:
+    """The polynomials of the refined solution: q cubic, qdot its exact derivative, u quadratic.
+
+    q is continuous, also across the exchange of the legs. Where a foot lands qdot jumps; between other
+    intervals it agrees as closely as the solution is accurate.
+    """
+
+    method = "radau"
+
+    def __init__(self, trajectory: RefinedTrajectory, step_length: float) -> None:
+        """Take a trajectory.
+
+        Args:
+            trajectory: One step on collocation intervals.
+            step_length: In [m].
+        """
+        self._trajectory, self._step_length = trajectory, step_length
+
+    @classmethod
+    def of(cls, refined: RefinedGait) -> "RefinedProfile":
+        """Return the profile of the refined part of a gait."""
+        return cls(refined.trajectory, refined.step_length)
+
+    @property
+    def step_time(self) -> float:
+        """Duration of the step in [s]."""
+        return self._trajectory.step_time
+
+    @property
+    def step_length(self) -> float:
+        """Distance that the step covers in [m]."""
+        return self._step_length
+
+    def sample(self, time: float) -> StepSample:
+        """Return the walker at a time in [s] from the start of the step, 0 <= time <= step_time."""
+        index, place = self._trajectory.locate(time)
+        q = self._trajectory.state(index, place)[:6]
+        qdot = self._trajectory.state_rate(index, place)[:6]
+        u = self._trajectory.torque(index, place)
+        for values in (q, qdot, u):
+            values.setflags(write=False)
+        return StepSample(q, qdot, u)
+
+
+def profile_of(gait: Gait) -> StepProfile:
+    """Return how a gait is walked: refined where that is certified, else as on the report's grid."""
+    return most_accurate(EulerProfile.of(gait), gait.refined)
+
+
+def most_accurate(euler: EulerProfile, refined: RefinedGait | None) -> StepProfile:
+    """Return the profile of a refined gait where there is a certified one, else that of the report's grid."""
+    if refined is None or not refined.certificate.certified:
+        return euler
+    return RefinedProfile.of(refined)
+
+
 class BlendedProfile:
     """The first step of a new gait, begun at the coordinates where the former gait ended.
 
@@ -117,6 +180,11 @@ class BlendedProfile:
         """
         self._profile = profile
         self._difference = start - profile.sample(0.0).q
+
+    @property
+    def method(self) -> str:
+        """Name of the method that the new gait was solved with."""
+        return self._profile.method
 
     @property
     def step_time(self) -> float:

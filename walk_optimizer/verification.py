@@ -1,6 +1,6 @@
 """Recomputes the certificates of stored gaits, whatever the files say about themselves."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from walk_optimizer.errors import GaitFileError
 from walk_optimizer.gait import Certificate, CertificateEntry, Gait
 from walk_optimizer.gait_files import SUFFIX, read_gait_file
 from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.refined_certificate import certify_refined
 
 # What a file states twice may differ by this much, in [m] and [s].
 _STATED_TOLERANCE = 1e-6
@@ -46,7 +47,7 @@ def verify_file(path: Path, walker: WalkerParameters) -> Verification:
     certificate = certify(gait.walker, gait.request, gait.spring, gait.trajectory)
     failed = ", ".join(
         f"{entry.family} is {entry.violation:.3g} {entry.unit}, allowed {entry.tolerance:.3g}"
-        for entry in (*certificate.entries, *_stated_entries(gait))
+        for entry in (*certificate.entries, *_stated_entries(gait), *_refined_entries(gait))
         if not entry.met
     )
     return Verification(path, gait, certificate, f"{path}: {failed}" if failed else "")
@@ -61,6 +62,14 @@ def _stated_entries(gait: Gait) -> tuple[CertificateEntry, ...]:
         CertificateEntry("step_length", abs(gait.step_length - landing), "m", _STATED_TOLERANCE),
         CertificateEntry("time", lateness, "s", _STATED_TOLERANCE),
     )
+
+
+def _refined_entries(gait: Gait) -> tuple[CertificateEntry, ...]:
+    """Return the residuals of the refined part, computed now; none without one."""
+    if gait.refined is None:
+        return ()
+    entries = certify_refined(gait.walker, gait.request, gait.refined).entries
+    return tuple(replace(entry, family=f"refined {entry.family}") for entry in entries)
 
 
 def verify_folder(folder: Path, walker: WalkerParameters) -> list[Verification]:

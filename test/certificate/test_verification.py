@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+from library.made_up_gait import with_refinement
+
 from walk_optimizer.gait_files import SUFFIX, write_gait_file
 from walk_optimizer.verification import verify_file
 
@@ -35,3 +37,11 @@ def test_wrong_times_fail(solved, tmp_path):
     trajectory = solved.gait.trajectory
     found = verified(solved, tmp_path, trajectory=replace(trajectory, time=3 * trajectory.time))
     assert f"time is {2 * solved.request.step_time:.3g} s, allowed 1e-06" in found.problem
+
+
+def test_a_refined_part_that_is_none_fails_by_family(solved, tmp_path):
+    refined = with_refinement(solved.gait).refined
+    assert refined.certificate.certified
+    problem = verified(solved, tmp_path, refined=refined).problem
+    assert "refined dynamics is " in problem
+    assert "refined interval_replay is " in problem

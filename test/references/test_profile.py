@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from library.made_up_gait import made_up_gait
+from library.made_up_gait import made_up_gait, with_refinement
 
-from walk_optimizer.profile import BlendedProfile, EulerProfile, relabelled
+from walk_optimizer.profile import BlendedProfile, EulerProfile, RefinedProfile, profile_of, relabelled
+from walk_optimizer.transcription.tableau import NODES
 
 GAIT = made_up_gait(points=20)
 PROFILE = EulerProfile.of(GAIT)
@@ -90,3 +91,56 @@ def test_a_blend_leads_from_one_gait_to_the_other(offset, time):
     slope = (added(b) - added(a)) / (b - a)
     middle = (a + b) / 2
     np.testing.assert_allclose(slope, blend.sample(middle).qdot - PROFILE.sample(middle).qdot, atol=1e-6)
+
+
+# ---------------------------------------------------------------- the refined solution
+
+REFINED_GAIT = with_refinement(GAIT, intervals=20)
+TRAJECTORY = REFINED_GAIT.refined.trajectory
+REFINED = profile_of(REFINED_GAIT)
+
+
+def test_the_refined_solution_is_walked_where_it_is_certified():
+    doubtful = with_refinement(GAIT, certified=False)
+    assert [profile_of(gait).method for gait in (GAIT, doubtful, REFINED_GAIT)] == [
+        "implicit_euler",
+        "implicit_euler",
+        "radau",
+    ]
+    longer = RefinedProfile(TRAJECTORY, 0.3)
+    assert (longer.step_length, longer.step_time) == (0.3, STEP)
+
+
+def test_refined_samples_at_the_nodes_are_the_solution():
+    for index, start in enumerate(TRAJECTORY.breaks[:-1]):
+        for node in range(3):
+            sample = REFINED.sample(start + NODES[node] * TRAJECTORY.lengths[index])
+            np.testing.assert_allclose(sample.q, TRAJECTORY.states[index, node + 1, :6], atol=1e-12)
+            np.testing.assert_allclose(sample.u, TRAJECTORY.torques[index, node], atol=1e-12)
+
+
+@patient
+@given(TIMES)
+def test_refined_velocity_is_the_derivative_of_position(time):
+    index, _ = TRAJECTORY.locate(time)
+    start, length = TRAJECTORY.breaks[index], TRAJECTORY.lengths[index]
+    middle = np.clip(time, start + 1e-5 * length, start + (1 - 1e-5) * length)
+    a, b = REFINED.sample(middle - 1e-6 * length).q, REFINED.sample(middle + 1e-6 * length).q
+    np.testing.assert_allclose((b - a) / (2e-6 * length), REFINED.sample(middle).qdot, atol=1e-7)
+
+
+def test_refined_position_is_continuous_and_velocity_but_for_the_impact():
+    for end in TRAJECTORY.breaks[1:-1]:
+        before, after = REFINED.sample(end), REFINED.sample(end + 1e-12)
+        np.testing.assert_allclose(before.q, after.q, atol=1e-10)
+        # The made-up motion is smooth; its cubic interpolant is not quite.
+        np.testing.assert_allclose(before.qdot, after.qdot, atol=5e-3)
+    begin = relabelled(REFINED.sample(STEP).q, REFINED.step_length)
+    np.testing.assert_allclose(REFINED.sample(0.0).q, begin, atol=1e-12)
+
+
+def test_a_refined_sample_is_cheap_and_read_only():
+    # The aim is well below 50 microseconds; a slow machine gets ten times as long.
+    assert min(timeit.repeat(lambda: REFINED.sample(0.3), number=100, repeat=5)) / 100 < 5e-4
+    sample = REFINED.sample(0.1)
+    assert not any(array.flags.writeable for array in (sample.q, sample.qdot, sample.u))
