@@ -64,7 +64,7 @@ def optimize(
 
     Returns:
         The gait and the report. A solve that fails gives no gait and raises nothing. A time limit that
-        interrupts no more than the search for other contacts gives the gait found before.
+        interrupts the search for other contacts, or the refinement, gives the gait found before.
 
     Raises:
         InvalidRequestError: the time limit is not above 0, or there is nothing to start from.
@@ -77,14 +77,20 @@ def optimize(
         raise InvalidRequestError("nothing to start from: give seeds, or search from scratch")
     session = SolveSession(settings, limit, progress)
     outcome = _Pipeline(request, walker, settings, session).run(seeds, from_scratch=from_scratch)
-    if outcome.gait is None or not refine:
+    if outcome.gait is None or session.stopped or not refine:
         return outcome
-    refined = refined_gait(outcome.gait, session)
+    return _refined(outcome.gait, session)
+
+
+def _refined(gait: Gait, session: SolveSession) -> Outcome:
+    """Return the outcome of a solved gait with its refinement, which the time limit may prevent."""
+    refined = refined_gait(gait, session)
+    report = replace(gait.report, iterations=session.iterations, solve_time=session.elapsed)
     if session.verdict is Status.CANCELLED:
-        return Outcome(
-            None, replace(outcome.report, status=session.verdict, message=session.verdict.sentence)
-        )
-    return replace(outcome, gait=replace(outcome.gait, refined=refined))
+        return Outcome(None, replace(report, status=session.verdict, message=session.verdict.sentence))
+    if session.stopped:
+        report = replace(report, message=f"{report.message}; the time limit cut the refinement short")
+    return Outcome(replace(gait, refined=refined, report=report), report)
 
 
 class _Pipeline:

@@ -17,7 +17,7 @@ from walk_optimizer.solve.solution import Solution
 from walk_optimizer.solve.status import Status
 
 REQUEST = GaitRequest.for_speed(0.42, "none", 25)
-STAGES = {"search", "fixed_schedule", "complementarity", "polish"}
+STAGES = {"search", "fixed_schedule", "complementarity", "polish", "refinement"}
 
 
 def assert_names_worst_family(report):
@@ -93,7 +93,7 @@ def test_cancelling(stage, walker):
     assert outcome.report.message.startswith("cancelled by the caller")
 
 
-@pytest.mark.parametrize("stage", ["complementarity", "polish"])
+@pytest.mark.parametrize("stage", ["complementarity", "polish", "refinement"])
 def test_cancelling_the_last_stages(walker, stage):
     stages = []
     outcome = optimize(
@@ -106,18 +106,28 @@ def test_cancelling_the_last_stages(walker, stage):
     assert stages[-1] == stage
 
 
-def test_a_time_limit_in_the_last_stages_leaves_the_gait_found_before(walker, monkeypatch):
+@pytest.mark.parametrize(
+    ("stage", "remark"),
+    [
+        ("complementarity", "search for other contacts"),
+        ("polish", "search for other contacts"),
+        ("refinement", "refinement"),
+    ],
+)
+def test_a_time_limit_in_the_last_stages_leaves_the_gait_found_before(walker, monkeypatch, stage, remark):
     clock = SimpleNamespace(now=0.0)
     monkeypatch.setattr(session_module, "time", SimpleNamespace(monotonic=lambda: clock.now))
 
     def progress(state):
         # Late from the first iteration of the stage on.
-        clock.now = 1e6 if state.stage == "complementarity" else 0.0
+        clock.now = 1e6 if state.stage == stage else 0.0
         return True
 
     outcome = optimize(REQUEST, walker, progress=progress)
     assert outcome.report.status is Status.SOLVED
-    assert outcome.report.message.endswith("; the time limit cut the search for other contacts short")
+    assert outcome.report.message.endswith(f"; the time limit cut the {remark} short")
+    assert outcome.gait.report is outcome.report
+    assert outcome.gait.refined is None
     assert outcome.gait.certificate.certified
 
 
