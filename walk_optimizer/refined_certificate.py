@@ -145,4 +145,5 @@ def _angle_excess(walker: WalkerParameters, states: FloatArray) -> FloatArray:
     """Return how far hips and knees are beyond their limits in [rad], (N,), states being (12, N)."""
     hips, knees = states[[2, 4]], states[[3, 5]]
     excess = np.concatenate([np.abs(hips) - walker.hip_angle_limit, -knees, knees - np.pi])
-    return np.maximum(0.0, excess.max(axis=0))
+    largest: FloatArray = np.maximum(0.0, excess.max(axis=0))
+    return largest

@@ -93,7 +93,7 @@ def replay_step(walker: WalkerParameters, spring: KneeSpring, trajectory: Refine
     Nothing is corrected on the way. At an impact inside the step the momentum jumps by J' impulse,
     as it does in the solution.
     """
-    state = trajectory.states[0, 0]
+    state: FloatArray = trajectory.states[0, 0]
     for index in range(trajectory.intervals):
         jump = trajectory.states[index, 0] - trajectory.states[index - 1, -1]
         if index and trajectory.impulses[index].any():

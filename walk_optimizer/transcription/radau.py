@@ -2,7 +2,7 @@
 
 States are cubic in each interval, torques and forces quadratic through the three collocation
 points. Feet that stand are held by their velocity at the collocation points (index 2), for which
-Radau IIA keeps order 5 in the states at the ends of intervals [HairerWanner1996, table VII.4.1].
+Radau IIA keeps order 5 in the states at the ends of intervals [Hairer1996, table VII.4.1].
 """
 
 from functools import cache

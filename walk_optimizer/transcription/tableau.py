@@ -1,6 +1,6 @@
 """The three-point Radau IIA method: nodes, differentiation weights, quadrature, interpolation.
 
-[HairerWanner1996, section IV.5]. Plain numbers, so that a solution is evaluated without CasADi.
+[Hairer1996, section IV.5]. Plain numbers, so that a solution is evaluated without CasADi.
 """
 
 import numpy as np
