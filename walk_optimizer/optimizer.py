@@ -79,11 +79,16 @@ def optimize(
     outcome = _Pipeline(request, walker, settings, session).run(seeds, from_scratch=from_scratch)
     if outcome.gait is None or session.stopped or not refine:
         return outcome
-    return _refined(outcome.gait, session)
+    return with_refinement(outcome.gait, session)
 
 
-def _refined(gait: Gait, session: SolveSession) -> Outcome:
-    """Return the outcome of a solved gait with its refinement, which the time limit may prevent."""
+def with_refinement(gait: Gait, session: SolveSession) -> Outcome:
+    """Return the outcome of a solved gait with its refinement, which the time limit may prevent.
+
+    Args:
+        gait: The gait on the report's grid.
+        session: Clock, cancelling and progress.
+    """
     refined = refined_gait(gait, session)
     report = replace(gait.report, iterations=session.iterations, solve_time=session.elapsed)
     if session.verdict is Status.CANCELLED:

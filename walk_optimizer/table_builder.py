@@ -2,7 +2,7 @@
 
 Each entry is first searched for from scratch, the entries in parallel. Then every entry is continued
 from its neighbours in speed and from the mode with less freedom, until no entry improves: none is
-left that its neighbour leads to a better optimum of.
+left that its neighbour leads to a better optimum of. At last each is refined.
 """
 
 import signal
@@ -14,9 +14,11 @@ from multiprocessing import get_context
 
 from walk_optimizer.gait import Gait
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
-from walk_optimizer.optimizer import Outcome, optimize
+from walk_optimizer.optimizer import Outcome, optimize, with_refinement
 from walk_optimizer.request import GaitRequest, gait_table_settings
 from walk_optimizer.search import SAME_OPTIMUM
+from walk_optimizer.solve.session import SolveSession
+from walk_optimizer.solve.settings import solver_settings
 
 # A key of the table: index of the speed, spring mode.
 Key = tuple[int, SpringMode]
@@ -29,7 +31,7 @@ class TableProgress:
     """One solve of the table has ended.
 
     Attributes:
-        stage: `search` or `continuation`.
+        stage: `search`, `continuation` or `refinement`.
         done: Solves that have ended in this stage.
         total: Solves of this stage.
         request: What was solved for.
@@ -56,7 +58,13 @@ class _Job:
 
 def _run(job: _Job) -> Outcome:
     """Solve one entry, in a process of the pool."""
-    return optimize(job.request, job.walker, seeds=job.seeds, from_scratch=job.from_scratch)
+    return optimize(job.request, job.walker, seeds=job.seeds, from_scratch=job.from_scratch, refine=False)
+
+
+def _refine(gait: Gait) -> Outcome:
+    """Refine one entry, in a process of the pool."""
+    settings = solver_settings()
+    return with_refinement(gait, SolveSession(settings, settings.time_limit, None))
 
 
 def build_table(
@@ -114,7 +122,22 @@ class _Builder:
             improved = self._solve([job for job in jobs if job.seeds], "continuation")
             if not improved:
                 break
+        self._refine()
         return self.table
+
+    def _refine(self) -> None:
+        """Add the accurate solution to every entry."""
+        futures = {self.pool.submit(_refine, gait): key for key, gait in self.table.items()}
+        for done, future in enumerate(as_completed(futures), start=1):
+            key, outcome = futures[future], future.result()
+            kept = outcome.gait is not None and outcome.gait.refined is not None
+            if kept and outcome.gait is not None:
+                self.table[key] = outcome.gait
+            self._tell(TableProgress("refinement", done, len(futures), self.requests[key], outcome, kept))
+
+    def _tell(self, progress: TableProgress) -> None:
+        if self.on_progress is not None:
+            self.on_progress(progress)
 
     def _job(self, key: Key, seeds: tuple[Gait, ...], *, from_scratch: bool) -> _Job:
         return _Job(key, self.requests[key], self.walker, seeds, from_scratch)
@@ -137,8 +160,7 @@ class _Builder:
             if kept and outcome.gait is not None:
                 self.table[job.key] = outcome.gait
                 improved.add(job.key)
-            if self.on_progress is not None:
-                self.on_progress(TableProgress(stage, done, len(jobs), job.request, outcome, kept))
+            self._tell(TableProgress(stage, done, len(jobs), job.request, outcome, kept))
         return improved
 
     def _is_better(self, key: Key, gait: Gait) -> bool:

@@ -95,14 +95,19 @@ class BuildDisplay:
 
 
 def store_better(gait: "Gait", folder: Path) -> bool:
-    """Write a gait, unless the folder holds a certified one of the same request with no larger F."""
+    """Write a gait, unless the folder holds a certified one of the same request that is as good.
+
+    As good means no larger F, and a refinement if this one has it.
+    """
     from walk_optimizer.gait_files import gait_file_name, write_gait_file
     from walk_optimizer.verification import verify_file
 
     path = folder / gait_file_name(gait)
     former = verify_file(path, gait.walker)
-    if former.passed and former.gait is not None and former.gait.objective <= gait.objective:
-        return False
+    if former.passed and former.gait is not None:
+        refined = former.gait.refined is not None or gait.refined is None
+        if former.gait.objective < gait.objective or (former.gait.objective == gait.objective and refined):
+            return False
     write_gait_file(gait, path)
     return True
 
