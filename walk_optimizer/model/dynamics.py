@@ -41,16 +41,20 @@ def velocity(walker: SymbolicWalker, q: ca.SX, p: ca.SX) -> ca.SX:
     the legs are eliminated first: the code and its derivatives are a fraction of a dense solve's.
     """
     matrix = mass_matrix(walker, q)
-    hip, legs = slice(0, 2), [slice(leg[0], leg[1] + 1) for leg in LEGS]
+    hip = slice(0, 2)
+    legs = [slice(leg[0], leg[1] + 1) for leg in LEGS]
+    # B_j C_j^-1 of each leg.
     coupled = [ca.mtimes(matrix[hip, leg], _inverse_2x2(matrix[leg, leg])) for leg in legs]
-    reduced = matrix[hip, hip] - sum(ca.mtimes(one, matrix[hip, leg].T) for one, leg in zip(coupled, legs, strict=True))
-    load = p[hip] - sum(ca.mtimes(one, p[leg]) for one, leg in zip(coupled, legs, strict=True))
+    reduced, load = matrix[hip, hip], p[hip]
+    for leg, one in zip(legs, coupled, strict=True):
+        reduced -= ca.mtimes(one, matrix[hip, leg].T)
+        load -= ca.mtimes(one, p[leg])
     hip_velocity = ca.mtimes(_inverse_2x2(reduced), load)
-    leg_velocities = [
-        ca.mtimes(_inverse_2x2(matrix[leg, leg]), p[leg] - ca.mtimes(matrix[hip, leg].T, hip_velocity))
-        for leg in legs
+    loads = [p[leg] - ca.mtimes(matrix[hip, leg].T, hip_velocity) for leg in legs]
+    velocities = [
+        ca.mtimes(_inverse_2x2(matrix[leg, leg]), one) for leg, one in zip(legs, loads, strict=True)
     ]
-    return ca.vertcat(hip_velocity, *leg_velocities)
+    return ca.vertcat(hip_velocity, *velocities)
 
 
 def _inverse_2x2(matrix: ca.SX) -> ca.SX:

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 
 from walk_optimizer.recording.metadata import FileEntry, bag_files, read_metadata
@@ -191,5 +191,5 @@ def _date(time_ns: int | None) -> str:
     if time_ns is None:
         return "no messages"
     seconds = time_ns / NANOSECONDS_PER_SECOND
-    date = datetime.fromtimestamp(seconds, tz=timezone.utc).isoformat(sep=" ")
+    date = datetime.fromtimestamp(seconds, tz=UTC).isoformat(sep=" ")
     return f"{date} ({time_ns} ns)"
