@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli.console import command, environment, walk_optimizer
-from library.made_up_gait import made_up_gait
+from library.made_up_gait import made_up_gait, with_refinement
 
 from walk_optimizer.gait_csv import COLUMNS, gait_csv
 from walk_optimizer.gait_files import gait_file_name, write_gait_file
@@ -65,7 +65,14 @@ def test_solve_prints_stores_and_exports(tmp_path, compiled):
     arguments = ["solve", "--speed", "1.0km/h", "--points", "40", "--save", "--export", csv]
     done = walk_optimizer(*arguments, home=tmp_path)
     assert done.returncode == 0, done.stderr
-    for text in ("0.2778 m/s (1.00 km/h)", "status         solved", "dynamics", "stored as", "exported to"):
+    for text in (
+        "0.2778 m/s (1.00 km/h)",
+        "status         solved",
+        "dynamics",
+        "refined        ",
+        "stored as",
+        "exported to",
+    ):
         assert text in done.stdout
     assert "FAILED" not in done.stdout
     assert "complementarity" in done.stderr
@@ -190,6 +197,28 @@ def test_a_file_can_be_named_instead(tmp_path, cached):
     done = walk_optimizer("export", "--file", path, "--output", output, home=tmp_path)
     assert (done.returncode, done.stdout) == (0, f"exported to {output}\n")
     assert output.read_text() == gait_csv(cached)
+
+
+def test_the_refined_part_is_exported_at_its_nodes(tmp_path, cached):
+    path = tmp_path / "gait.npz"
+    gait = with_refinement(cached)
+    write_gait_file(gait, path)
+    done = walk_optimizer("export", "--file", path, "--grid", "refined", home=tmp_path)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[9:11] == [
+        "# grid: radau",
+        "time,q1,q2,q3,q4,q5,q6,p1,p2,p3,p4,p5,p6,u1,u2,u3,lambda1_x,lambda1_y,lambda2_x,lambda2_y",
+    ]
+    table = np.array([[float(text) for text in line.split(",")] for line in lines[11:]])
+    trajectory = gait.refined.trajectory
+    np.testing.assert_array_equal(table[:, 1:13], trajectory.states[:, 1:].reshape(-1, 12))
+    np.testing.assert_array_equal(table[:, 13:16], trajectory.torques.reshape(-1, 3))
+    np.testing.assert_array_equal(table[:, 16:], trajectory.forces.reshape(-1, 4))
+    np.testing.assert_allclose(table[2::3, 0], trajectory.breaks[1:], rtol=1e-15)
+    write_gait_file(cached, path)
+    none = walk_optimizer("export", "--file", path, "--grid", "refined", home=tmp_path)
+    assert (none.returncode, "has no refined part" in none.stderr) == (2, True)
 
 
 @pytest.mark.parametrize("ending", ["png", "pdf", "svg"])

@@ -88,7 +88,7 @@ class _Demo:
         return 0 if clean and reception.right else 1
 
     def _work(self) -> "tuple[Gait, Reception, Path]":
-        from walk_optimizer.cli.text import request_text
+        from walk_optimizer.cli.text import refinement_text, request_text
         from walk_optimizer.nodes.demo_client import demo_client
 
         bag = self._output.absolute() / "bag"
@@ -99,6 +99,7 @@ class _Demo:
                 f"solved in {gait.report.solve_time:.1f} s and certified: F = {gait.objective:.2f} (N m)^2, "
                 f"K = {gait.spring.stiffness:.2f} N m/rad, q_eq = {gait.spring.equilibrium:.3f} rad"
             )
+            self._say(refinement_text(gait))
             self._say(f"reference_publisher: {client.set_gait(self._request, _SOLVE_TIMEOUT)}")
             client.start_recording(str(bag))
             reception = client.listen(self._seconds)

@@ -18,6 +18,10 @@ speed, step_length, step_time, N, spring mode, K, q_eq, friction and F.
   lambda1_xp, _xm, _y      ground reaction of foot 1 forward, backward, up; lambda2 of foot 2
   gamma1, gamma2           slip speeds of the feet
 
+With --grid refined one row a node of the refined solution, which controllers are fed;
+instead of the last columns lambda1_x, lambda1_y, lambda2_x, lambda2_y. The line
+`# grid: radau` tells. N and F remain those of the report's grid.
+
 The gait comes from the library; one that the library lacks is solved."""
 
 _EPILOG = """\
@@ -33,6 +37,7 @@ def add_parser(verbs: Subparsers) -> None:
     parser = add_verb(verbs, "export", _TEXT, _EPILOG)
     add_gait_choice(parser)
     parser.add_argument("--format", choices=["csv"], default="csv", help="default: csv")
+    parser.add_argument("--grid", choices=["report", "refined"], default="report", help="default: report")
     parser.add_argument("--output", type=Path, metavar="FILE", help="default: standard output")
     parser.set_defaults(run=run)
 
@@ -40,13 +45,14 @@ def add_parser(verbs: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the gait."""
     from walk_optimizer.cli.gaits import chosen_gait
-    from walk_optimizer.gait_csv import gait_csv, write_csv
-    from walk_optimizer.gait_files.access import writable_target
+    from walk_optimizer.gait_csv import gait_csv, refined_csv
+    from walk_optimizer.gait_files.access import writable_target, write_text
 
+    to_csv = refined_csv if args.grid == "refined" else gait_csv
     if args.output is None:
-        sys.stdout.write(gait_csv(chosen_gait(args)))
+        sys.stdout.write(to_csv(chosen_gait(args)))
         return 0
     writable_target(args.output)
-    write_csv(chosen_gait(args), args.output)
+    write_text(args.output, to_csv(chosen_gait(args)))
     print(f"exported to {args.output}")
     return 0

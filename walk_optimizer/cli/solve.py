@@ -46,7 +46,13 @@ def run(args: argparse.Namespace) -> int:
     time_limit = None if args.time_limit is None else positive_seconds(args.time_limit)
 
     from walk_optimizer.cli.gaits import solve
-    from walk_optimizer.cli.text import certificate_text, gait_text, report_text, request_text
+    from walk_optimizer.cli.text import (
+        certificate_text,
+        gait_text,
+        refinement_text,
+        report_text,
+        request_text,
+    )
     from walk_optimizer.gait_csv import write_csv
     from walk_optimizer.gait_files.access import writable_target
     from walk_optimizer.library import GaitLibrary
@@ -61,6 +67,7 @@ def run(args: argparse.Namespace) -> int:
     if outcome.gait is None:
         return 1
     print(gait_text(outcome.gait))
+    print(refinement_text(outcome.gait))
     print(f"\n{certificate_text(outcome.gait.certificate)}")
     if args.export:
         write_csv(outcome.gait, args.export)

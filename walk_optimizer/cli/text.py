@@ -35,6 +35,18 @@ def gait_text(gait: Gait) -> str:
     )
 
 
+def refinement_text(gait: Gait) -> str:
+    """Return one line about the refined part of a gait."""
+    if gait.refined is None:
+        return "refined        no: what is walked is the gait on the report's grid"
+    refined, worst = gait.refined, worst_entry(gait.refined.certificate)
+    return (
+        f"refined        {refined.trajectory.intervals} intervals, torque effort "
+        f"{refined.trajectory.torque_effort:.6g} (report's grid: {gait.torque_effort:.6g}), "
+        f"{worst.family} at {share_of_tolerance(worst):.0%} of its limit"
+    )
+
+
 def report_text(report: SolveReport) -> str:
     """Return how a solve went."""
     effort = f"{report.starts} starts, {report.iterations} iterations, {report.solve_time:.2f} s"
