@@ -4,7 +4,7 @@ import os
 
 import pytest
 import yaml
-from library.made_up_gait import made_up_gait
+from library.made_up_gait import made_up_gait, with_refinement
 
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import WalkerParameters
@@ -62,12 +62,13 @@ def other_walker(tmp_path_factory):
 
 @pytest.fixture
 def stocked(other_walker, tmp_path):
-    """Parameters of a library node that has two gaits, made up and therefore there at once."""
+    """Parameters of a library node with two gaits, made up and therefore there at once; FAST is refined."""
     folder = tmp_path / "gaits"
     folder.mkdir()
     walker = WalkerParameters(hip_mass=HIP_MASS)
     library = GaitLibrary(walker, folder)
     for speed, torque in ((SLOW, 1.0), (FAST, 3.0)):
         mode = "stiffness_and_equilibrium"
-        library.store(made_up_gait(speed=speed, mode=mode, torque=torque, walker=walker))
+        gait = made_up_gait(speed=speed, mode=mode, torque=torque, walker=walker)
+        library.store(with_refinement(gait) if speed == FAST else gait)
     return {"walker_file": other_walker, "cache_folder": folder, "points": 20}

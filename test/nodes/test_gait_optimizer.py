@@ -12,8 +12,7 @@ from walk_optimizer_interfaces.action import OptimizeGait as OptimizeGaitAction
 from walk_optimizer_interfaces.srv import OptimizeGait
 
 from walk_optimizer.errors import InvalidRequestError
-from walk_optimizer.model.parameters import SpringMode, WalkerParameters
-from walk_optimizer.nodes.conversions import gait_from_message, gait_to_message, request_of_message
+from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.nodes.qos import SERVICE as SERVICE_QOS
 from walk_optimizer.request import GaitRequest
 
@@ -211,16 +210,3 @@ def test_a_parameter_out_of_range_keeps_its_value(graph, optimizer):
     assert accepted.successful
     assert not frozen.successful
     assert graph.get_parameter(node, "time_limit").double_value == 7.0
-
-
-def test_a_gait_survives_the_message():
-    from library.made_up_gait import made_up_gait
-
-    gait = made_up_gait(mode="stiffness_and_equilibrium")
-    message = gait_to_message(gait)
-    report = OptimizeGait.Response().report
-    report.status = "solved"
-    back = gait_from_message(message, report, WalkerParameters(), request_of_message(message))
-    for name in ("time", "q", "p", "u", "reaction", "slip_speed"):
-        assert (getattr(back.trajectory, name) == getattr(gait.trajectory, name)).all()
-    assert (back.spring, back.certificate, back.speed) == (gait.spring, gait.certificate, gait.speed)

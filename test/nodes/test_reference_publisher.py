@@ -20,9 +20,8 @@ from walk_optimizer_interfaces.msg import Gait
 from walk_optimizer_interfaces.srv import GetJointTrajectory, SetGait, StartRecording, StopRecording
 
 from walk_optimizer.errors import InvalidRequestError
-from walk_optimizer.nodes.conversions import trajectory_from_message
+from walk_optimizer.nodes.joint_stream import StreamedGait
 from walk_optimizer.nodes.qos import LATCHED
-from walk_optimizer.profile import EulerProfile
 from walk_optimizer.reference_check import CycleMatcher
 from walk_optimizer.references import JOINTS
 from walk_optimizer.request import GaitRequest
@@ -44,6 +43,7 @@ def publisher(start, stocked):
 def walk(graph, speed=SLOW):
     answer = graph.call(SetGait, f"{NODE}/set_gait", speed=speed, spring_mode=MODE)
     assert answer.success, answer.message
+    assert ("(radau)" if speed == FAST else "(implicit_euler)") in answer.message
 
 
 def stamp_ns(message):
@@ -51,7 +51,7 @@ def stamp_ns(message):
 
 
 def matcher_of(gait):
-    return CycleMatcher(EulerProfile(trajectory_from_message(gait), gait.step_length, gait.step_time))
+    return CycleMatcher(StreamedGait.from_message(gait).profile)
 
 
 def match(matcher, message):
@@ -188,7 +188,7 @@ def values(message):
 def test_the_bag_holds_what_was_streamed(graph, publisher, tmp_path):
     joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
     torques = graph.subscribe(Float64MultiArray, f"{NODE}/feedforward_torques")
-    walk(graph)
+    walk(graph, FAST)
     started = graph.call(StartRecording, f"{NODE}/start_recording", directory=str(tmp_path / "bag"))
     assert (started.success, started.directory) == (True, str(tmp_path / "bag"))
     again = graph.call(StartRecording, f"{NODE}/start_recording")
@@ -203,7 +203,8 @@ def test_the_bag_holds_what_was_streamed(graph, publisher, tmp_path):
     bag = read_bag(tmp_path / "bag")
     recorded = bag[f"/{NODE}/joint_reference"]
     assert sum(map(len, bag.values())) == stopped.messages
-    assert len(bag[f"/{NODE}/gait"]) == 1
+    (gait,) = bag[f"/{NODE}/gait"]
+    assert [step.intervals for step in gait.refined] == [5]
     by_stamp = {stamp_ns(message): message for message in recorded}
     first, last = min(by_stamp), max(by_stamp)
     within = [message for message in joints if first <= stamp_ns(message) <= last]

@@ -2,26 +2,26 @@
 
 import math
 from array import array
+from collections.abc import Sequence
 
 import numpy as np
-from builtin_interfaces.msg import Duration
 from numpy.typing import NDArray
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from walk_optimizer_interfaces.action import OptimizeGait as OptimizeGaitAction
 from walk_optimizer_interfaces.msg import Certificate as CertificateMessage
 from walk_optimizer_interfaces.msg import Gait as GaitMessage
 from walk_optimizer_interfaces.msg import GaitSummary as GaitSummaryMessage
+from walk_optimizer_interfaces.msg import RefinedStep
 from walk_optimizer_interfaces.msg import SolverReport as SolverReportMessage
 
 from walk_optimizer.errors import GaitFileError
-from walk_optimizer.gait import Certificate, CertificateEntry, Gait, Trajectory
+from walk_optimizer.gait import Certificate, CertificateEntry, Gait, RefinedGait, Trajectory
+from walk_optimizer.gait_files.checks import positive
+from walk_optimizer.gait_files.refined import REFINED_PREFIX, ROW_SHAPES, refined_trajectory
 from walk_optimizer.library_entries import GaitSummary
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
-from walk_optimizer.references import JOINTS, Cycle
+from walk_optimizer.profile import EulerProfile
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import FamilyViolation, Progress, SolveReport, Status
-
-METHOD = "implicit_euler"
 
 # Field of the message, attribute of the trajectory, rows.
 _ARRAYS = (
@@ -48,15 +48,31 @@ def gait_to_message(gait: Gait) -> GaitMessage:
         stiffness=gait.spring.stiffness,
         equilibrium=gait.spring.equilibrium,
         friction_coefficient=gait.walker.friction_coefficient,
-        method=METHOD,
+        method=EulerProfile.method,
         points=gait.trajectory.points,
         objective=gait.objective,
         torque_effort=gait.torque_effort,
         time=doubles(gait.trajectory.time),
         certificate=certificate_to_message(gait.certificate),
+        refined=[] if gait.refined is None else [refined_to_message(gait.refined)],
     )
     for field, attribute, _ in _ARRAYS:
         setattr(message, field, doubles(getattr(gait.trajectory, attribute)))
+    return message
+
+
+def refined_to_message(refined: RefinedGait) -> RefinedStep:
+    """Return the refined part of a gait as a message."""
+    message = RefinedStep(
+        intervals=refined.trajectory.intervals,
+        step_length=refined.step_length,
+        stiffness=refined.spring.stiffness,
+        equilibrium=refined.spring.equilibrium,
+        torque_effort=refined.trajectory.torque_effort,
+        certificate=certificate_to_message(refined.certificate),
+    )
+    for name in ("breaks", *ROW_SHAPES):
+        setattr(message, name, doubles(getattr(refined.trajectory, name)))
     return message
 
 
@@ -67,19 +83,47 @@ def trajectory_from_message(message: GaitMessage) -> Trajectory:
         GaitFileError: an array is not of the size that `points` says, or not finite.
     """
     points = message.points
-    arrays = {"time": np.array(message.time)}
+    if points == 0:
+        raise GaitFileError("gait message: points is 0, expected at least 1")
+    arrays = {"time": _array("time", message.time, (points,))}
     for field, attribute, rows in _ARRAYS:
-        arrays[attribute] = np.array(getattr(message, field))
-        if arrays[attribute].size != rows * points:
-            raise GaitFileError(
-                f"gait message: {field} has {arrays[attribute].size} numbers, expected {rows} x {points}"
-            )
-        arrays[attribute] = arrays[attribute].reshape(rows, points)
-    if points == 0 or arrays["time"].size != points:
-        raise GaitFileError(f"gait message: time has {arrays['time'].size} numbers, expected {points} > 0")
+        arrays[attribute] = _array(field, getattr(message, field), (rows, points))
     if not all(np.isfinite(values).all() for values in arrays.values()):
         raise GaitFileError("gait message: a number is not finite")
     return Trajectory(**arrays)
+
+
+def refined_from_message(message: GaitMessage) -> RefinedGait | None:
+    """Return the refined part of a gait message; None where there is none.
+
+    Raises:
+        GaitFileError: an array is not of the size that `intervals` says, or not finite, or the
+            intervals don't fill the step.
+    """
+    if not message.refined:
+        return None
+    (step,) = message.refined
+    shapes = {"breaks": (step.intervals + 1,)} | {
+        name: (step.intervals, *rest) for name, rest in ROW_SHAPES.items()
+    }
+    arrays = {
+        f"{REFINED_PREFIX}{name}": _array(f"refined {name}", getattr(step, name), shape)
+        for name, shape in shapes.items()
+    }
+    return RefinedGait(
+        trajectory=refined_trajectory(arrays, message.step_time),
+        spring=KneeSpring(step.stiffness, step.equilibrium),
+        step_length=positive(step.step_length, "gait message: step_length of the refined part"),
+        certificate=certificate_from_message(step.certificate),
+    )
+
+
+def _array(name: str, numbers: Sequence[float], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return the numbers of a message as an array; raise GaitFileError unless they are so many."""
+    if len(numbers) != math.prod(shape):
+        expected = " x ".join(map(str, shape))
+        raise GaitFileError(f"gait message: {name} has {len(numbers)} numbers, expected {expected}")
+    return np.array(numbers, dtype=np.float64).reshape(shape)
 
 
 def gait_from_message(
@@ -94,6 +138,7 @@ def gait_from_message(
         report=report_from_message(report),
         certificate=certificate_from_message(message.certificate),
         step_length=message.step_length,
+        refined=refined_from_message(message),
     )
 
 
@@ -115,9 +160,15 @@ def certificate_to_message(certificate: Certificate) -> CertificateMessage:
 
 
 def certificate_from_message(message: CertificateMessage) -> Certificate:
-    """Return the certificate of a message; it is judged anew, not believed."""
-    rows = zip(message.family, message.violation, message.unit, message.tolerance, strict=True)
-    return Certificate(tuple(CertificateEntry(*row) for row in rows))
+    """Return the certificate of a message; it is judged anew, not believed.
+
+    Raises:
+        GaitFileError: its columns are not equally long.
+    """
+    columns = (message.family, message.violation, message.unit, message.tolerance)
+    if len(set(map(len, columns))) > 1:
+        raise GaitFileError("gait message: the columns of a certificate are not equally long")
+    return Certificate(tuple(CertificateEntry(*row) for row in zip(*columns, strict=True)))
 
 
 def report_to_message(report: SolveReport) -> SolverReportMessage:
@@ -178,31 +229,3 @@ def summary_to_message(summary: GaitSummary) -> GaitSummaryMessage:
         points=summary.points,
         certified=summary.certified,
     )
-
-
-def cycle_to_message(cycle: Cycle) -> JointTrajectory:
-    """Return a cycle as joint_trajectory_controller takes it.
-
-    The stamp stays 0, which means "begin when it arrives"; with a real one, a replay is refused as
-    past. The last velocity is 0, because a trajectory that does not end at rest is refused unless the
-    controller is told otherwise.
-    """
-    velocity = cycle.velocity.copy()
-    velocity[:, -1] = 0.0
-    return JointTrajectory(
-        joint_names=list(JOINTS),
-        points=[
-            JointTrajectoryPoint(
-                positions=doubles(cycle.position[:, index]),
-                velocities=doubles(velocity[:, index]),
-                effort=doubles(cycle.effort[:, index]),
-                time_from_start=_duration(time),
-            )
-            for index, time in enumerate(cycle.time.tolist())
-        ],
-    )
-
-
-def _duration(seconds: float) -> Duration:
-    whole = math.floor(seconds)
-    return Duration(sec=whole, nanosec=min(round((seconds - whole) * 1e9), 999_999_999))

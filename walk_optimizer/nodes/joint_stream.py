@@ -12,11 +12,11 @@ from walk_optimizer_interfaces.msg import Gait as GaitMessage
 
 from walk_optimizer.errors import SolveFailedError
 from walk_optimizer.nodes.bag import RecordedTopic, StreamBag
-from walk_optimizer.nodes.conversions import doubles, trajectory_from_message
+from walk_optimizer.nodes.conversions import doubles, refined_from_message, trajectory_from_message
 from walk_optimizer.nodes.pacer import Pacer
 from walk_optimizer.nodes.publisher_settings import TORQUES
 from walk_optimizer.nodes.qos import LATCHED, STREAM
-from walk_optimizer.profile import EulerProfile, StepProfile
+from walk_optimizer.profile import EulerProfile, StepProfile, most_accurate
 from walk_optimizer.references import JOINTS, Reference, ReferenceGenerator
 
 
@@ -34,7 +34,7 @@ class StreamedGait:
 
     @classmethod
     def from_message(cls, message: GaitMessage) -> "StreamedGait":
-        """Return the gait of a message.
+        """Return the gait of a message; its refined part is walked if that is certified.
 
         Raises:
             GaitFileError: its arrays don't fit.
@@ -42,8 +42,12 @@ class StreamedGait:
         """
         if not message.certificate.certified:
             raise SolveFailedError("only certified gaits are streamed; this one is not")
-        trajectory = trajectory_from_message(message)
-        return cls(message, EulerProfile(trajectory, message.step_length, message.step_time))
+        euler = EulerProfile(trajectory_from_message(message), message.step_length, message.step_time)
+        return cls(message, most_accurate(euler, refined_from_message(message)))
+
+    def __str__(self) -> str:
+        """Return the speed that is walked, and by the solution of which method."""
+        return f"{self.profile.step_length / self.profile.step_time:.4f} m/s ({self.profile.method})"
 
 
 class JointStream:

@@ -11,7 +11,7 @@ from walk_optimizer_interfaces.srv import GetGait, GetJointTrajectory, SetGait, 
 
 from walk_optimizer.errors import GaitNotFoundError, WalkOptimizerError
 from walk_optimizer.nodes.bag import StreamBag, new_bag_folder
-from walk_optimizer.nodes.conversions import cycle_to_message
+from walk_optimizer.nodes.cycle_message import cycle_to_message
 from walk_optimizer.nodes.joint_stream import JointStream, StreamedGait
 from walk_optimizer.nodes.publisher_settings import SETTINGS, recorder_settings
 from walk_optimizer.nodes.qos import COMMAND
@@ -81,8 +81,14 @@ class ReferencePublisherNode(SuiteNode):
         wanted = GaitRequest.for_speed(request.speed, request.spring_mode)
         self._target = None  # A speed that is still being fetched is older than this command.
         gait = await self._fetch(wanted)
+        response.message = self._walk(gait)
+
+    def _walk(self, gait: StreamedGait) -> str:
+        """Stream a gait, and return what is streamed."""
         self._stream.walk(gait)
-        response.message = f"{gait.message.speed:.4f} m/s from the next step on"
+        text = f"{gait} from the next step on"
+        self.get_logger().info(text, throttle_duration_sec=1.0)
+        return text
 
     def _on_target_speed(self, message: Float64) -> None:
         try:
@@ -101,7 +107,7 @@ class ReferencePublisherNode(SuiteNode):
                 gait = await self._fetch(target)
                 if target == self._target:
                     self._target = None
-                    self._stream.walk(gait)
+                    self._walk(gait)
         except WalkOptimizerError as error:
             self._target = None
             self.get_logger().warning(f"target speed refused: {error}")
@@ -117,7 +123,7 @@ class ReferencePublisherNode(SuiteNode):
     async def _library_was_away(self, request: GaitRequest) -> bool:
         """Walk as requested; return whether it is worth to try again."""
         try:
-            self._stream.walk(await self._fetch(request))
+            self._walk(await self._fetch(request))
         except ServiceUnavailableError:
             return True
         except WalkOptimizerError as error:
