@@ -99,7 +99,7 @@ class _Demo:
                 f"solved in {gait.report.solve_time:.1f} s and certified: F = {gait.objective:.2f} (N m)^2, "
                 f"K = {gait.spring.stiffness:.2f} N m/rad, q_eq = {gait.spring.equilibrium:.3f} rad"
             )
-            self._say(refinement_text(gait))
+            self._say(f"refined: {refinement_text(gait)}")
             self._say(f"reference_publisher: {client.set_gait(self._request, _SOLVE_TIMEOUT)}")
             client.start_recording(str(bag))
             reception = client.listen(self._seconds)

@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     if outcome.gait is None:
         return 1
     print(gait_text(outcome.gait))
-    print(refinement_text(outcome.gait))
+    print(f"refined        {refinement_text(outcome.gait)}")
     print(f"\n{certificate_text(outcome.gait.certificate)}")
     if args.export:
         write_csv(outcome.gait, args.export)

@@ -36,12 +36,12 @@ def gait_text(gait: Gait) -> str:
 
 
 def refinement_text(gait: Gait) -> str:
-    """Return one line about the refined part of a gait."""
+    """Return what refining a gait led to, as one line."""
     if gait.refined is None:
-        return "refined        no: what is walked is the gait on the report's grid"
+        return "no: what is walked is the gait on the report's grid"
     refined, worst = gait.refined, worst_entry(gait.refined.certificate)
     return (
-        f"refined        {refined.trajectory.intervals} intervals, torque effort "
+        f"{refined.trajectory.intervals} intervals, torque effort "
         f"{refined.trajectory.torque_effort:.6g} (report's grid: {gait.torque_effort:.6g}), "
         f"{worst.family} at {share_of_tolerance(worst):.0%} of its limit"
     )
