@@ -1,5 +1,6 @@
 """The gait: one step of a periodic walk, frozen, with what it was solved for and its certificate."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +39,7 @@ class CertificateEntry(FamilyViolation):
     @property
     def relative(self) -> float:
         """Violation in units of its tolerance; infinite if it is not a number."""
-        return self.violation / self.tolerance if self.violation == self.violation else float("inf")
+        return self.violation / self.tolerance if self.violation < math.inf else math.inf
 
 
 @dataclass(frozen=True)

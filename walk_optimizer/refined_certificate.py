@@ -33,6 +33,9 @@ def certify_refined(walker: WalkerParameters, request: GaitRequest, gait: Refine
         gait: The refined gait.
     """
     trajectory = gait.trajectory
+    if not trajectory.is_finite:
+        # An integrator would not come to an end.
+        return Certificate((CertificateEntry("finite", np.inf, "-", 0.0),))
     nodes = trajectory.states[:, 1:].reshape(-1, 12).T
     mechanics = mechanics_at(walker, gait.spring, nodes[:6], nodes[6:])
     forces = trajectory.forces.reshape(-1, 4).T

@@ -49,6 +49,12 @@ class RefinedTrajectory:
         """Duration of the step in [s]."""
         return float(self.breaks[-1])
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether every value is a finite number."""
+        values = (self.breaks, self.states, self.torques, self.forces, self.impulses)
+        return all(bool(np.isfinite(one).all()) for one in values)
+
     @cached_property
     def lengths(self) -> FloatArray:
         """Lengths of the intervals in [s], (n,)."""

@@ -1,0 +1,75 @@
+"""The refined gait: certified, converged, and walked by its own torques."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from walk_optimizer.gait import Gait, RefinedGait
+from walk_optimizer.refined_certificate import certify_refined
+from walk_optimizer.refinement import refine
+from walk_optimizer.replay import replay_step
+from walk_optimizer.solve.session import SolveSession
+from walk_optimizer.solve.settings import solver_settings
+
+
+def test_it_is_certified_and_walks_as_fast_as_requested(gait: Gait, refined: RefinedGait) -> None:
+    assert refined.certificate.certified
+    assert refined.step_length >= gait.request.step_length - 1e-9
+    assert np.isclose(refined.trajectory.step_time, gait.request.step_time, rtol=1e-12)
+
+
+def test_its_torques_replayed_over_the_step_end_where_it_ends(gait: Gait, refined: RefinedGait) -> None:
+    end = replay_step(gait.walker, refined.spring, refined.trajectory)
+    assert np.abs(end - refined.trajectory.states[-1, -1])[:6].max() < 1e-4
+
+
+def test_a_mesh_twice_as_fine_changes_its_effort_by_less_than_a_thousandth(
+    gait: Gait, session: SolveSession
+) -> None:
+    from walk_optimizer.refinement import _Refinement, _resampled
+
+    solution = refine(gait, session)
+    assert solution.trajectory is not None
+    finer = solution.mesh.divided(np.full(solution.mesh.intervals, 2))
+    start = _resampled(solution.trajectory, solution.spring, solution.mesh, finer)
+    again = _Refinement(gait, session)._solved(finer, start)
+    assert again.effort == pytest.approx(solution.effort, rel=1e-3)
+
+
+def test_the_grid_of_the_report_overestimates_the_effort(gait: Gait, refined: RefinedGait) -> None:
+    assert refined.trajectory.torque_effort < 0.9 * gait.torque_effort
+
+
+@pytest.mark.parametrize(
+    ("change", "family"),
+    [
+        ({"torques": 1.001}, "dynamics"),
+        ({"forces": 1.001}, "dynamics"),
+        ({"impulses": 1.01}, "impact"),
+        ({"states": 1.0001}, "kinematics"),
+        ({"breaks": 1.001}, "kinematics"),
+    ],
+)
+def test_what_is_broken_is_found(
+    gait: Gait, refined: RefinedGait, change: dict[str, float], family: str
+) -> None:
+    ((name, factor),) = change.items()
+    scaled = getattr(refined.trajectory, name) * factor
+    broken = replace(refined, trajectory=replace(refined.trajectory, **{name: scaled}))
+    certificate = certify_refined(gait.walker, gait.request, broken)
+    assert family in {entry.family for entry in certificate.failures()}
+
+
+def test_what_is_not_a_number_fails(gait: Gait, refined: RefinedGait) -> None:
+    torques = refined.trajectory.torques.copy()
+    torques[3, 1, 2] = np.nan
+    broken = replace(refined, trajectory=replace(refined.trajectory, torques=torques))
+    assert not certify_refined(gait.walker, gait.request, broken).certified
+
+
+def test_a_cancelled_refinement_says_so(gait: Gait) -> None:
+    session = SolveSession(solver_settings(), 300.0, lambda progress: progress.iteration < 3)
+    solution = refine(gait, session)
+    assert session.stopped
+    assert solution.trajectory is None
