@@ -86,11 +86,11 @@ def test_what_is_lacking_is_solved_once_and_stored(graph, start, stocked):
 def test_an_optimizer_that_is_killed_is_told_and_its_successor_is_asked(graph, start, stocked):
     start("gait_library", **stocked | {"points": 2000})
     optimizer = start("gait_optimizer", walker_file=stocked["walker_file"])
-    # The library waits for a node that starts, but not for as long as a busy machine takes.
     graph.spin_until(lambda: "ready" in optimizer.output(), "the optimizer")
     first = graph.send(GetGait, GET, speed=0.4, spring_mode="none")
     graph.spin_until(lambda: "asking" in start.nodes[0].output(), "the question")
-    graph.spin_for(1.0)
+    # Longer than the library looks for the optimizer: now it waits for the answer.
+    graph.spin_for(4.0)
     # The library answers others while it waits.
     assert graph.call(GetGait, GET, speed=SLOW, spring_mode=MODE).success
     optimizer.kill()
