@@ -2,47 +2,63 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from walk_optimizer.cli.text import aligned, cost, number
 from walk_optimizer.errors import GaitNotFoundError
 from walk_optimizer.library import GaitLibrary
-from walk_optimizer.model.parameters import SpringMode
+from walk_optimizer.model.parameters import KneeSpring, SpringMode
 from walk_optimizer.report_table import TABLE_I, ReportResult
 from walk_optimizer.request import KMH_PER_MS, gait_table_settings
 
 Rows = list[Sequence[str]]
 
 _LEGEND = """\
-F in (N m)^2, F% = 100 F / F of none at the same speed, K in N m/rad, q_eq in rad.
+{cost}, K in N m/rad, q_eq in rad. F% = 100 F / F of none at the same speed.
 A dash: not in the library."""
+_COSTS = {
+    False: "F = sum over the grid points of |u|^2 / 2 in (N m)^2",
+    True: "F = integral over the step of |u|^2 / 2 dt in (N m)^2 s, on the refined grid",
+}
 
 
-def table_text(library: GaitLibrary) -> str:
-    """Return the table, one line for each speed of the gait table."""
+@dataclass(frozen=True)
+class _Shown:
+    """What the table shows of a gait: its springs and its cost."""
+
+    spring: KneeSpring
+    cost: float
+
+
+def table_text(library: GaitLibrary, *, refined: bool = False) -> str:
+    """Return the table, one line for each speed, of the report's grid or of the refined one."""
     speeds = gait_table_settings().table_speeds()
-    nominal = [_objective(library, speed, SpringMode.NONE) for speed in speeds]
+    nominal = _nominal(library, speeds, refined)
     blocks = [
         _block("speed", [("m/s", "km/h", "report"), *_speed_rows(speeds)]),
         _block("none", [("F",), *((cost(value),) for value in nominal)]),
     ]
     for mode in (SpringMode.STIFFNESS, SpringMode.STIFFNESS_AND_EQUILIBRIUM):
         reported = [row.results[mode] for row in TABLE_I]
-        blocks.append(_block(mode.value, _our_rows(library, mode, speeds, nominal)))
+        blocks.append(_block(mode.value, _our_rows(library, mode, nominal, refined)))
         blocks.append(_block("report", _report_rows(reported)))
-    return "\n".join(" | ".join(line).rstrip() for line in zip(*blocks, strict=True)) + f"\n{_LEGEND}"
+    return (
+        "\n".join(" | ".join(line).rstrip() for line in zip(*blocks, strict=True))
+        + f"\n{_LEGEND.format(cost=_COSTS[refined])}"
+    )
 
 
-def markdown_table(library: GaitLibrary) -> str:
+def markdown_table(library: GaitLibrary, *, refined: bool = False) -> str:
     """Return the table as Markdown; bold where our F% is at or below the report's."""
     speeds = gait_table_settings().table_speeds()
-    nominal = [_objective(library, speed, SpringMode.NONE) for speed in speeds]
+    nominal = _nominal(library, speeds, refined)
     columns = [
         ["km/h", "---", *(f"{speed * KMH_PER_MS:.2f}" for speed in speeds)],
         ["none: F", "---", *map(cost, nominal)],
     ]
     for mode in (SpringMode.STIFFNESS, SpringMode.STIFFNESS_AND_EQUILIBRIUM):
         reported = [row.results[mode] for row in TABLE_I]
-        head, *ours = _our_rows(library, mode, speeds, nominal)
+        head, *ours = _our_rows(library, mode, nominal, refined)
         marked = [_marked(row, result) for row, result in zip(ours, reported, strict=True)]
         columns.append([f"{mode.value}: {', '.join(head)}", "---", *map(", ".join, marked)])
         head, *theirs = _report_rows(reported)
@@ -73,21 +89,18 @@ def _speed_rows(speeds: Sequence[float]) -> Rows:
     ]
 
 
-def _our_rows(
-    library: GaitLibrary, mode: SpringMode, speeds: Sequence[float], nominal: Sequence[float]
-) -> Rows:
+def _our_rows(library: GaitLibrary, mode: SpringMode, nominal: Sequence[float], refined: bool) -> Rows:
     """Return K, q_eq where it is free, F and F% of the library's gaits."""
     free = mode is SpringMode.STIFFNESS_AND_EQUILIBRIUM
     rows: Rows = [("K", *(["q_eq"] if free else []), "F", "F%")]
-    for speed, reference in zip(speeds, nominal, strict=True):
-        try:
-            gait, _ = library.find(speed, mode)
-        except GaitNotFoundError:
+    for speed, reference in zip(gait_table_settings().table_speeds(), nominal, strict=True):
+        shown = _shown(library, speed, mode, refined)
+        if shown is None:
             rows.append(["-"] * len(rows[0]))
             continue
-        equilibrium = [f"{gait.spring.equilibrium:.3f}"] if free else []
-        share = number(100 * gait.objective / reference, ".1f")
-        rows.append((f"{gait.spring.stiffness:.2f}", *equilibrium, cost(gait.objective), share))
+        equilibrium = [f"{shown.spring.equilibrium:.3f}"] if free else []
+        share = number(100 * shown.cost / reference, ".1f")
+        rows.append((f"{shown.spring.stiffness:.2f}", *equilibrium, cost(shown.cost), share))
     return rows
 
 
@@ -101,9 +114,20 @@ def _report_rows(results: Sequence[ReportResult]) -> Rows:
     return rows
 
 
-def _objective(library: GaitLibrary, speed: float, mode: SpringMode) -> float:
-    """Return F of a gait of the library, NaN when it is not there."""
+def _nominal(library: GaitLibrary, speeds: Sequence[float], refined: bool) -> list[float]:
+    """Return F without springs at each speed, NaN where it is not in the library."""
+    found = [_shown(library, speed, SpringMode.NONE, refined) for speed in speeds]
+    return [math.nan if shown is None else shown.cost for shown in found]
+
+
+def _shown(library: GaitLibrary, speed: float, mode: SpringMode, refined: bool) -> _Shown | None:
+    """Return springs and cost of a gait of the library; None when it is not there."""
     try:
-        return library.find(speed, mode)[0].objective
+        gait, _ = library.find(speed, mode)
     except GaitNotFoundError:
-        return math.nan
+        return None
+    if not refined:
+        return _Shown(gait.spring, gait.objective)
+    if gait.refined is None:
+        return None
+    return _Shown(gait.refined.spring, gait.refined.trajectory.torque_effort)

@@ -105,5 +105,5 @@ def number(value: float, pattern: str) -> str:
 
 
 def cost(value: float) -> str:
-    """Return F with about four digits, written out."""
-    return number(value, ".0f" if value >= 1000 else ".1f")
+    """Return F with three or four digits, written out."""
+    return number(value, ".0f" if value >= 1000 else ".1f" if value >= 10 else ".3g")
