@@ -15,8 +15,9 @@ from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.replay import interval_errors
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.status import Status
+from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
 from walk_optimizer.transcription.phases import INSTANT_POINTS, Phase, phases_of
-from walk_optimizer.transcription.refined import Mesh, RefinedPoints, RefinedProblem
+from walk_optimizer.transcription.refined import RefinedProblem
 from walk_optimizer.transcription.scaling import torque_unit
 
 FloatArray = NDArray[np.float64]

@@ -5,8 +5,9 @@ import numpy as np
 
 from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.gait import Gait
+from walk_optimizer.transcription.mesh import Mesh
 from walk_optimizer.transcription.phases import phases_of
-from walk_optimizer.transcription.refined import Mesh, RefinedProblem
+from walk_optimizer.transcription.refined import RefinedProblem
 from walk_optimizer.transcription.tableau import DIFFERENTIATION, NODES, NODES_WITH_START, QUADRATURE
 
 

@@ -1,13 +1,10 @@
 """The refined problem: Radau collocation of each contact phase, impacts between them, free durations."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.contact.schedule import FootMode
 from walk_optimizer.model.kinematics import KNEE_1, KNEE_2, UPPER_1, UPPER_2
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
@@ -15,85 +12,25 @@ from walk_optimizer.transcription import radau
 from walk_optimizer.transcription.boundary import boundary_functions
 from walk_optimizer.transcription.chain import STATE_WIDTH, Stage, assemble
 from walk_optimizer.transcription.compilation import compiled
-from walk_optimizer.transcription.phases import Modes, Phase
+from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
+from walk_optimizer.transcription.phase_bounds import (
+    PhaseLayout,
+    force_bounds,
+    impact_bounds,
+    interval_bounds,
+    kept_rows,
+    landing_after,
+)
 from walk_optimizer.transcription.problems import spring_bounds
 from walk_optimizer.transcription.program import Nlp, Problem
 from walk_optimizer.transcription.scaling import point_units, spring_units, torque_unit
-from walk_optimizer.transcription.tableau import NODES_WITH_START, STAGES
+from walk_optimizer.transcription.tableau import STAGES
 
 FloatArray = NDArray[np.float64]
 
 # Shared variables: K, q_eq, then the duration of each phase in [s].
 _SPRING = (0, 1)
 _SHORTEST_PHASE = 1e-3
-# Rows of contact in a point or an impact, two of each: gaps, velocities along x and y, sides of cones.
-_GAP, _TANGENTIAL, _NORMAL, _CONE = 0, 2, 4, 6
-
-
-@dataclass(frozen=True, eq=False)
-class RefinedPoints:
-    """Values of all variables of the refined grid in SI units.
-
-    Attributes:
-        states: At the start of each interval and at its nodes, (n, 4, 12): q, then p.
-        torques: At the nodes of each interval in [N m], (n, 3, 3).
-        forces: Ground reactions at the nodes in [N], (n, 3, 4): x, y of foot 1, then of foot 2.
-        durations: Of each phase in [s].
-        impulses: Of each phase's impact in [N s], (phases, 4); zero where there is none.
-        spring: K and q_eq.
-    """
-
-    states: FloatArray
-    torques: FloatArray
-    forces: FloatArray
-    durations: FloatArray
-    impulses: FloatArray
-    spring: KneeSpring
-
-
-@dataclass(frozen=True, eq=False)
-class Mesh:
-    """Phases with their intervals.
-
-    Attributes:
-        phases: The contact phases of the step.
-        parts: For each phase the lengths of its intervals as parts of it; they add up to 1.
-    """
-
-    phases: tuple[Phase, ...]
-    parts: tuple[FloatArray, ...]
-
-    @property
-    def intervals(self) -> int:
-        """Number of intervals of the step."""
-        return sum(part.size for part in self.parts)
-
-    @property
-    def phase_of_interval(self) -> NDArray[np.int64]:
-        """Index of the phase of each interval, (n,)."""
-        return np.repeat(np.arange(len(self.phases)), [part.size for part in self.parts])
-
-    @property
-    def first_intervals(self) -> NDArray[np.int64]:
-        """Index of the first interval of each phase."""
-        return self.phase_of_interval.searchsorted(np.arange(len(self.phases)))
-
-    def node_times(self, durations: FloatArray) -> FloatArray:
-        """Return the times of the start and the nodes of each interval in [s], (n, 4)."""
-        lengths = self.lengths(durations)
-        starts = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-        times: FloatArray = starts[:, None] + lengths[:, None] * NODES_WITH_START
-        return times
-
-    def divided(self, counts: NDArray[np.int64]) -> "Mesh":
-        """Return the mesh with each interval cut into equal parts; `counts` is (n,)."""
-        of_phases = np.split(counts, self.first_intervals[1:])
-        pairs = zip(self.parts, of_phases, strict=True)
-        return Mesh(self.phases, tuple(np.repeat(part / count, count) for part, count in pairs))
-
-    def lengths(self, durations: FloatArray) -> FloatArray:
-        """Return the lengths of all intervals in [s], (n,), for durations of the phases in [s]."""
-        return np.concatenate([part * time for part, time in zip(self.parts, durations, strict=True)])
 
 
 class RefinedProblem:
@@ -155,9 +92,9 @@ class RefinedProblem:
         count, phases = self.mesh.intervals, len(self.mesh.phases)
         state_low, state_high = self._state_bounds()
         modes = [self.mesh.phases[k].modes for k in self.mesh.phase_of_interval]
-        force_low, force_high = np.array([_force_bounds(one) for one in modes]).transpose(1, 0, 2)
+        force_low, force_high = np.array([force_bounds(one) for one in modes]).transpose(1, 0, 2)
         free = np.full((count, STAGES, 3), np.inf)
-        impulses = np.array([_force_bounds(phase.impact) for phase in self.mesh.phases]).transpose(1, 0, 2)
+        impulses = np.array([force_bounds(phase.impact) for phase in self.mesh.phases]).transpose(1, 0, 2)
         bounds = []
         for sign, states, forces, impulse, spring, duration in (
             (-1, state_low, force_low, impulses[0], low, _SHORTEST_PHASE),
@@ -244,114 +181,33 @@ def state_before_step(walker: WalkerParameters, state: FloatArray) -> FloatArray
     return before
 
 
-_Layout = tuple[tuple[Phase, int], ...]
-
-
 @lru_cache(maxsize=16)
-def _assembled(layout: _Layout) -> Nlp:
+def _assembled(layout: PhaseLayout) -> Nlp:
     """Return the program of phases with their numbers of intervals."""
     stages = []
     for index, (phase, intervals) in enumerate(layout):
         if phase.begins_with_impact:
-            kept = _kept(_impact_bounds(phase))
+            kept = kept_rows(impact_bounds(phase))
             stages.append(Stage(radau.impact_kind(), (), kept))
-        kept = _kept(_interval_bounds(phase.modes))
+        kept = kept_rows(interval_bounds(phase.modes))
         shared = (*_SPRING, 2 + index)
         stages += [Stage(radau.interval_kind(), shared, kept)] * (intervals - 1)
-        kept = _kept(_interval_bounds(phase.modes, _landing_after(layout, index)))
+        kept = kept_rows(interval_bounds(phase.modes, landing_after(layout, index)))
         stages.append(Stage(radau.interval_kind(), shared, kept))
     durations = np.concatenate([np.zeros(2), np.ones(len(layout))])
     return assemble(stages, durations.size, durations[None])
 
 
-def _chain_bounds(layout: _Layout) -> tuple[FloatArray, FloatArray]:
+def _chain_bounds(layout: PhaseLayout) -> tuple[FloatArray, FloatArray]:
     """Return the bounds of the kept rows of all stages."""
     lower: list[FloatArray] = []
     upper: list[FloatArray] = []
     for index, (phase, intervals) in enumerate(layout):
-        blocks = [_impact_bounds(phase)] * phase.begins_with_impact
-        blocks += [_interval_bounds(phase.modes)] * (intervals - 1)
-        blocks.append(_interval_bounds(phase.modes, _landing_after(layout, index)))
+        blocks = [impact_bounds(phase)] * phase.begins_with_impact
+        blocks += [interval_bounds(phase.modes)] * (intervals - 1)
+        blocks.append(interval_bounds(phase.modes, landing_after(layout, index)))
         for bounds in blocks:
-            kept = _kept(bounds)
+            kept = kept_rows(bounds)
             lower.append(bounds[0][kept])
             upper.append(bounds[1][kept])
     return np.concatenate(lower), np.concatenate(upper)
-
-
-_RowBounds = tuple[FloatArray, FloatArray]
-
-
-def _kept(bounds: _RowBounds) -> NDArray[np.bool_]:
-    """Return which rows have a bound."""
-    return np.isfinite(bounds[0]) | np.isfinite(bounds[1])
-
-
-def _landing_after(layout: _Layout, index: int) -> tuple[bool, bool]:
-    """Return which feet land at the end of a phase; the legs change names at the last."""
-    last = index == len(layout) - 1
-    first, second = layout[0 if last else index + 1][0].landing
-    return (second, first) if last else (first, second)
-
-
-def _interval_bounds(modes: Modes, landing: tuple[bool, bool] = (False, False)) -> _RowBounds:
-    """Return the bounds of an interval's rows: dynamics, then contacts at each node.
-
-    The impact after it pins the gap of a landing foot, so the last node must not bound it once more.
-    """
-    contact = _contact_bounds(modes)
-    dynamics = np.zeros(STAGES * STATE_WIDTH)
-    low, high = (np.concatenate([dynamics, *[side] * STAGES]) for side in contact)
-    last_gaps = low[-radau.CONTACT_ROWS :][_GAP : _GAP + 2]
-    last_gaps[list(landing)] = -np.inf
-    return low, high
-
-
-def _impact_bounds(phase: Phase) -> _RowBounds:
-    """Return the bounds of an impact's rows: momentum, then contacts.
-
-    A landing foot is on the ground. One that stood before is there already: to pin it once more
-    would ask twice for the same.
-    """
-    contact = _contact_bounds(phase.impact)
-    low, high = (np.concatenate([np.zeros(STATE_WIDTH), side]) for side in contact)
-    for foot in range(2):
-        gap = STATE_WIDTH + _GAP + foot
-        low[gap], high[gap] = (0.0, 0.0) if phase.landing[foot] else (-np.inf, np.inf)
-    return low, high
-
-
-def _contact_bounds(modes: Modes) -> _RowBounds:
-    """Return the bounds of the contact rows, (10,) each.
-
-    A foot that stands has zero velocity, one in the air stays above the ground. One that slips has
-    its tangential force on the side of the cone against it.
-    """
-    low, high = np.full(radau.CONTACT_ROWS, -np.inf), np.full(radau.CONTACT_ROWS, np.inf)
-
-    def pin(row: int) -> None:
-        low[row] = high[row] = 0.0
-
-    for foot, mode in enumerate(modes):
-        if mode is FootMode.FREE:
-            low[_GAP + foot] = 0.0
-            continue
-        pin(_NORMAL + foot)
-        # Rows of the cone: mu f_y - f_x, then mu f_y + f_x.
-        low[_CONE + 2 * foot : _CONE + 2 * foot + 2] = 0.0
-        if mode is FootMode.STICK:
-            pin(_TANGENTIAL + foot)
-        elif mode is FootMode.SLIP_FORWARD:
-            low[_TANGENTIAL + foot] = 0.0
-            pin(_CONE + 2 * foot + 1)
-        else:
-            high[_TANGENTIAL + foot] = 0.0
-            pin(_CONE + 2 * foot)
-    return low, high
-
-
-def _force_bounds(modes: Sequence[FootMode]) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of forces or impulses, (4,) each: none on a free foot, no pulling."""
-    loaded = np.repeat([mode is not FootMode.FREE for mode in modes], 2)
-    high = np.where(loaded, np.inf, 0.0)
-    return np.where([True, False, True, False], -high, 0.0), high

@@ -1,0 +1,96 @@
+"""Bounds of the rows and forces of a phase: what a foot does there, as equations and inequalities."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.contact.schedule import FootMode
+from walk_optimizer.transcription import radau
+from walk_optimizer.transcription.chain import STATE_WIDTH
+from walk_optimizer.transcription.phases import Modes, Phase
+from walk_optimizer.transcription.tableau import STAGES
+
+FloatArray = NDArray[np.float64]
+# Lower and upper bounds of a stage's rows; rows without any take no part.
+RowBounds = tuple[FloatArray, FloatArray]
+# Phases with their numbers of intervals.
+PhaseLayout = tuple[tuple[Phase, int], ...]
+
+# Rows of contact in a point or an impact, two of each: gaps, velocities along x and y, sides of cones.
+_GAP, _TANGENTIAL, _NORMAL, _CONE = 0, 2, 4, 6
+
+
+def kept_rows(bounds: RowBounds) -> NDArray[np.bool_]:
+    """Return which rows have a bound."""
+    return np.isfinite(bounds[0]) | np.isfinite(bounds[1])
+
+
+def landing_after(layout: PhaseLayout, index: int) -> tuple[bool, bool]:
+    """Return which feet land at the end of a phase; the legs change names at the last."""
+    last = index == len(layout) - 1
+    first, second = layout[0 if last else index + 1][0].landing
+    return (second, first) if last else (first, second)
+
+
+def interval_bounds(modes: Modes, landing: tuple[bool, bool] = (False, False)) -> RowBounds:
+    """Return the bounds of an interval's rows: dynamics, then contacts at each node.
+
+    The impact after it pins the gap of a landing foot, so the last node must not bound it once more.
+    """
+    contact = _contact_bounds(modes)
+    dynamics = np.zeros(STAGES * STATE_WIDTH)
+    low, high = (np.concatenate([dynamics, *[side] * STAGES]) for side in contact)
+    last_gaps = low[-radau.CONTACT_ROWS :][_GAP : _GAP + 2]
+    last_gaps[list(landing)] = -np.inf
+    return low, high
+
+
+def impact_bounds(phase: Phase) -> RowBounds:
+    """Return the bounds of an impact's rows: momentum, then contacts.
+
+    A landing foot is on the ground. One that stood before is there already: to pin it once more
+    would ask twice for the same.
+    """
+    contact = _contact_bounds(phase.impact)
+    low, high = (np.concatenate([np.zeros(STATE_WIDTH), side]) for side in contact)
+    for foot in range(2):
+        gap = STATE_WIDTH + _GAP + foot
+        low[gap], high[gap] = (0.0, 0.0) if phase.landing[foot] else (-np.inf, np.inf)
+    return low, high
+
+
+def _contact_bounds(modes: Modes) -> RowBounds:
+    """Return the bounds of the contact rows, (10,) each.
+
+    A foot that stands has zero velocity, one in the air stays above the ground. One that slips has
+    its tangential force on the side of the cone against it.
+    """
+    low, high = np.full(radau.CONTACT_ROWS, -np.inf), np.full(radau.CONTACT_ROWS, np.inf)
+
+    def pin(row: int) -> None:
+        low[row] = high[row] = 0.0
+
+    for foot, mode in enumerate(modes):
+        if mode is FootMode.FREE:
+            low[_GAP + foot] = 0.0
+            continue
+        pin(_NORMAL + foot)
+        # Rows of the cone: mu f_y - f_x, then mu f_y + f_x.
+        low[_CONE + 2 * foot : _CONE + 2 * foot + 2] = 0.0
+        if mode is FootMode.STICK:
+            pin(_TANGENTIAL + foot)
+        elif mode is FootMode.SLIP_FORWARD:
+            low[_TANGENTIAL + foot] = 0.0
+            pin(_CONE + 2 * foot + 1)
+        else:
+            high[_TANGENTIAL + foot] = 0.0
+            pin(_CONE + 2 * foot)
+    return low, high
+
+
+def force_bounds(modes: Sequence[FootMode]) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of forces or impulses, (4,) each: none on a free foot, no pulling."""
+    loaded = np.repeat([mode is not FootMode.FREE for mode in modes], 2)
+    high = np.where(loaded, np.inf, 0.0)
+    return np.where([True, False, True, False], -high, 0.0), high
