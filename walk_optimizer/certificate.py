@@ -141,4 +141,5 @@ def certify(
 
 def _excess(*values: FloatArray | float) -> float:
     """Return the largest of all values and 0; not a number if any value is not."""
-    return float(np.max([0.0, *(np.max(value) for value in values)]))
+    # Adding 0.0 keeps a negative zero from being printed as such.
+    return float(np.max([0.0, *(np.max(value) for value in values)])) + 0.0
