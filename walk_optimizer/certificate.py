@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from walk_optimizer.gait import Certificate, CertificateEntry, Trajectory
 from walk_optimizer.mechanics import Mechanics, foot_arm, mechanics_at
+from walk_optimizer.model.kinematics import RELABELLED
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest
 
@@ -15,12 +16,11 @@ RELATIVE_TOLERANCE = 1e-6
 _PENETRATION_TOLERANCE = 1e-6
 _KINEMATIC_TOLERANCE = 1e-6
 _BOUND_TOLERANCE = 1e-6
-_RELABELLED = (0, 1, 4, 5, 2, 3)
 
 
 def _state_before(q: FloatArray, p: FloatArray, step_length: float) -> tuple[FloatArray, FloatArray]:
     """Return coordinates and momenta at the points before each, the first relabelled from the last."""
-    first_q, first_p = q[list(_RELABELLED), -1], p[list(_RELABELLED), -1]
+    first_q, first_p = q[list(RELABELLED), -1], p[list(RELABELLED), -1]
     first_q[0] -= step_length
     return np.column_stack([first_q, q[:, :-1]]), np.column_stack([first_p, p[:, :-1]])
 

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from walk_optimizer.model.parameters import DYNAMIC_PARAMETERS
 from walk_optimizer.transcription.boundary import boundary_functions
 from walk_optimizer.transcription.compilation import compiled
 from walk_optimizer.transcription.program import Nlp
@@ -21,7 +22,7 @@ IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
 
 STATE_WIDTH = 12
-_WALKER_PARAMETERS = 7
+_WALKER_PARAMETERS = len(DYNAMIC_PARAMETERS)
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,15 +43,24 @@ def _assembled(rows: bytes, points: int) -> Nlp:
     return assemble(stages, layout.SPRING_WIDTH, np.zeros((0, layout.SPRING_WIDTH)))
 
 
-def _variable_bounds(request: GaitRequest, walker: WalkerParameters) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of all points, (23, N) each, in SI units (report section IV)."""
-    lower = np.full((layout.POINT_WIDTH, request.points), -np.inf)
+def state_bounds(walker: WalkerParameters) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of a state, (12,) each, in SI units (report section IV)."""
+    lower = np.full(layout.STATE.stop, -np.inf)
     upper = -lower
     for row in (UPPER_1, UPPER_2):
         lower[row], upper[row] = -walker.hip_angle_limit, walker.hip_angle_limit
     for row in (KNEE_1, KNEE_2):
         lower[row], upper[row] = 0.0, np.pi
-    lower[layout.P][0] = 0.0
+    lower[layout.P.start] = 0.0
+    return lower, upper
+
+
+def _variable_bounds(request: GaitRequest, walker: WalkerParameters) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of all points, (23, N) each, in SI units."""
+    lower = np.full((layout.POINT_WIDTH, request.points), -np.inf)
+    upper = -lower
+    for bounds, of_state in zip((lower, upper), state_bounds(walker), strict=True):
+        bounds[layout.STATE] = of_state[:, None]
     lower[layout.REACTION] = 0.0
     lower[layout.SLIP] = 0.0
     return lower, upper

@@ -5,7 +5,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.model.kinematics import KNEE_1, KNEE_2, UPPER_1, UPPER_2
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.transcription import radau
@@ -21,7 +20,7 @@ from walk_optimizer.transcription.phase_bounds import (
     kept_rows,
     landing_after,
 )
-from walk_optimizer.transcription.problems import spring_bounds
+from walk_optimizer.transcription.problems import spring_bounds, state_bounds
 from walk_optimizer.transcription.program import Nlp, Problem
 from walk_optimizer.transcription.scaling import point_units, spring_units, torque_unit
 from walk_optimizer.transcription.tableau import STAGES
@@ -90,7 +89,7 @@ class RefinedProblem:
     def _variable_bounds(self) -> tuple[FloatArray, FloatArray]:
         low, high = spring_bounds(self.request.spring_mode, self.walker)
         count, phases = self.mesh.intervals, len(self.mesh.phases)
-        state_low, state_high = self._state_bounds()
+        state_low, state_high = state_bounds(self.walker)
         modes = [self.mesh.phases[k].modes for k in self.mesh.phase_of_interval]
         force_low, force_high = np.array([force_bounds(one) for one in modes]).transpose(1, 0, 2)
         free = np.full((count, STAGES, 3), np.inf)
@@ -113,17 +112,6 @@ class RefinedProblem:
         for place in (one for one in self.impact_start if one is not None):
             bounds[0][place : place + 6], bounds[1][place : place + 6] = -np.inf, np.inf
         return bounds[0], bounds[1]
-
-    def _state_bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Return the bounds of a state, (12,) each, in SI units (report section IV)."""
-        lower = np.full(STATE_WIDTH, -np.inf)
-        upper = -lower
-        for row in (UPPER_1, UPPER_2):
-            lower[row], upper[row] = -self.walker.hip_angle_limit, self.walker.hip_angle_limit
-        for row in (KNEE_1, KNEE_2):
-            lower[row], upper[row] = 0.0, np.pi
-        lower[6] = 0.0
-        return lower, upper
 
     def pack(self, points: RefinedPoints) -> FloatArray:
         """Return the scaled vector of all variables."""
