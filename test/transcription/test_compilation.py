@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from walk_optimizer.transcription.boundary import boundary_functions
+from walk_optimizer.transcription.boundary import periodic_functions
 from walk_optimizer.transcription.compilation import COMPILER_VARIABLE, cache_folder, compiled
 from walk_optimizer.transcription.euler_stage import euler_functions
 
@@ -56,7 +56,7 @@ def compiler(tmp_path, monkeypatch):
 
 
 @needs_compiler
-@pytest.mark.parametrize("build", [euler_functions, boundary_functions])
+@pytest.mark.parametrize("build", [euler_functions, periodic_functions])
 def test_compiled_functions_equal_the_interpreters(build, monkeypatch):
     monkeypatch.delenv("XDG_CACHE_HOME")
     machine_code, generator = compiled(build), np.random.default_rng(4)

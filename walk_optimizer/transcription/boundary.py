@@ -1,37 +1,77 @@
-"""Closes the chain of a step: the legs change names, and the hip moves back by one step length."""
+"""The ends of the chain of a step: periodic, or begun from a given state."""
+
+from functools import cache
 
 import casadi as ca
 
 from walk_optimizer.model.kinematics import RELABELLED, foot_position
 from walk_optimizer.model.symbolic import SymbolicWalker
+from walk_optimizer.transcription import layout
+from walk_optimizer.transcription.compilation import compiled
 from walk_optimizer.transcription.scaling import point_units
+from walk_optimizer.transcription.stage import Ends
 
 
-def boundary_functions() -> list[ca.Function]:
-    """Return the functions that join the last state of a step to its first, in scaled variables.
+def end_functions(name: str, z: ca.SX, par: ca.SX, rows: ca.SX) -> list[ca.Function]:
+    """Return the functions that `Ends` describes.
 
-    `boundary_value(z, walker)` gives the state before the step (12 rows) and the step length, the
-    place where foot 2 lands. The stance foot of the next step then stands at the origin, which pins
-    the walker's place. `boundary_jacobian` adds the nonzeros of the Jacobian, `boundary_hessian`
-    gives those of the upper triangle for multipliers (13,) of the rows.
+    Args:
+        name: Prefix of their names.
+        z: The last stage's state, scaled.
+        par: The model's vector and the ends' own numbers.
+        rows: The state handed to the first stage, then further rows, scaled.
     """
-    walker = SymbolicWalker()
-    z, lam = ca.SX.sym("z", 12), ca.SX.sym("lam", 13)
-    units = ca.vertcat(*point_units(walker)[:12])
+    lam = ca.SX.sym("lam", rows.numel())
+    jacobian = ca.jacobian(rows, z)
+    hessian = ca.triu(ca.hessian(ca.dot(lam, rows), z)[0])
+    inputs = [z, par]
+    return [
+        ca.Function(f"{name}_value", inputs, [rows]),
+        ca.Function(f"{name}_jacobian", inputs, [rows, jacobian.nz[:]]),
+        ca.Function(f"{name}_hessian", [*inputs, lam], [hessian.nz[:]]),
+        ca.Function(f"{name}_jacobian_pattern", inputs, [jacobian]),
+        ca.Function(f"{name}_hessian_pattern", [*inputs, lam], [hessian]),
+    ]
+
+
+def periodic_functions() -> list[ca.Function]:
+    """Return the functions that join the last state of a step to its first.
+
+    The legs change names and the hip moves back by the step length, the place where foot 2 lands, so
+    that the stance foot of the next step stands at the origin. That pins the walker's place. The one
+    further row is the step length.
+    """
+    walker, z = SymbolicWalker(), ca.SX.sym("z", layout.STATE_WIDTH)
+    units = ca.vertcat(*point_units(walker)[: layout.STATE_WIDTH])
     physical = z * units
-    q, p = physical[:6], physical[6:]
+    q, p = physical[layout.Q], physical[layout.P]
     step_length = foot_position(walker, q, 1)[0]
     relabelled = q[list(RELABELLED)]
     relabelled[0] -= step_length
     state = ca.vertcat(relabelled, p[list(RELABELLED)]) / units
     rows = ca.vertcat(state, step_length / walker.leg_length)
-    jacobian = ca.jacobian(rows, z)
-    hessian = ca.triu(ca.hessian(ca.dot(lam, rows), z)[0])
-    inputs = [z, walker.symbols]
-    return [
-        ca.Function("boundary_value", inputs, [rows]),
-        ca.Function("boundary_jacobian", inputs, [rows, jacobian.nz[:]]),
-        ca.Function("boundary_hessian", [*inputs, lam], [hessian.nz[:]]),
-        ca.Function("boundary_jacobian_pattern", inputs, [jacobian]),
-        ca.Function("boundary_hessian_pattern", [*inputs, lam], [hessian]),
-    ]
+    return end_functions("periodic", z, walker.symbols, rows)
+
+
+def given_start_functions() -> list[ca.Function]:
+    """Return the functions of a step that begins in a given state, the ends' own numbers, scaled.
+
+    The one further row is the place where foot 2 ends, in leg lengths.
+    """
+    walker, z = SymbolicWalker(), ca.SX.sym("z", layout.STATE_WIDTH)
+    start = ca.SX.sym("start", layout.STATE_WIDTH)
+    q = (z * ca.vertcat(*point_units(walker)[: layout.STATE_WIDTH]))[layout.Q]
+    rows = ca.vertcat(start, foot_position(walker, q, 1)[0] / walker.leg_length)
+    return end_functions("given_start", z, ca.vertcat(walker.symbols, start), rows)
+
+
+@cache
+def periodic_ends() -> Ends:
+    """Return the ends of a step that is repeated with the legs relabelled."""
+    return Ends("periodic", compiled(periodic_functions))
+
+
+@cache
+def given_start_ends() -> Ends:
+    """Return the ends of a step that begins in a given state."""
+    return Ends("given_start", compiled(given_start_functions))

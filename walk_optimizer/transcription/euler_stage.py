@@ -9,9 +9,9 @@ from walk_optimizer.contact.complementarity import contact_pairs, net_force
 from walk_optimizer.model import dynamics
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.transcription import layout
-from walk_optimizer.transcription.chain import StageKind
 from walk_optimizer.transcription.compilation import compiled
 from walk_optimizer.transcription.scaling import point_units, row_units, spring_units
+from walk_optimizer.transcription.stage import StageKind
 from walk_optimizer.transcription.stage_functions import stage_functions
 
 

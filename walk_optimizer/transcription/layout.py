@@ -13,6 +13,7 @@ STATE = slice(0, 12)
 U = slice(12, 15)
 REACTION = slice(15, 21)
 SLIP = slice(21, 23)
+STATE_WIDTH = 12
 POINT_WIDTH = 23
 SPRING_WIDTH = 2
 

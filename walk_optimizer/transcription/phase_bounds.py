@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from walk_optimizer.contact.schedule import FootMode
 from walk_optimizer.transcription import radau
-from walk_optimizer.transcription.chain import STATE_WIDTH
+from walk_optimizer.transcription.layout import STATE_WIDTH
 from walk_optimizer.transcription.phases import Modes, Phase
 from walk_optimizer.transcription.tableau import STAGES
 

@@ -10,10 +10,12 @@ from walk_optimizer.model.kinematics import KNEE_1, KNEE_2, UPPER_1, UPPER_2
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.transcription import layout
-from walk_optimizer.transcription.chain import Stage, assemble
+from walk_optimizer.transcription.boundary import periodic_ends
+from walk_optimizer.transcription.chain import assemble
 from walk_optimizer.transcription.euler_stage import euler_kind
 from walk_optimizer.transcription.program import Nlp, Problem
 from walk_optimizer.transcription.scaling import point_units, spring_units
+from walk_optimizer.transcription.stage import Stage
 
 FloatArray = NDArray[np.float64]
 
@@ -40,7 +42,7 @@ def from_scaled(walker: WalkerParameters, x: FloatArray) -> tuple[FloatArray, Kn
 def _assembled(rows: bytes, points: int) -> Nlp:
     kept = np.frombuffer(rows, dtype=bool).reshape(layout.ROW_WIDTH, points)
     stages = [Stage(euler_kind(), (0, 1), kept[:, point]) for point in range(points)]
-    return assemble(stages, layout.SPRING_WIDTH, np.zeros((0, layout.SPRING_WIDTH)))
+    return assemble(stages, periodic_ends(), layout.SPRING_WIDTH, np.zeros((0, layout.SPRING_WIDTH)))
 
 
 def state_bounds(walker: WalkerParameters) -> tuple[FloatArray, FloatArray]:

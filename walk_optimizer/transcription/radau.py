@@ -13,9 +13,10 @@ import numpy as np
 from walk_optimizer.model import dynamics
 from walk_optimizer.model.kinematics import foot_position
 from walk_optimizer.model.symbolic import SymbolicWalker
-from walk_optimizer.transcription.chain import STATE_WIDTH, StageKind
 from walk_optimizer.transcription.compilation import compiled
+from walk_optimizer.transcription.layout import STATE_WIDTH
 from walk_optimizer.transcription.scaling import point_units, spring_units
+from walk_optimizer.transcription.stage import StageKind
 from walk_optimizer.transcription.stage_functions import stage_functions
 from walk_optimizer.transcription.tableau import DIFFERENTIATION, QUADRATURE, STAGES
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.transcription import radau
-from walk_optimizer.transcription.boundary import boundary_functions
-from walk_optimizer.transcription.chain import STATE_WIDTH, Stage, assemble
-from walk_optimizer.transcription.compilation import compiled
+from walk_optimizer.transcription.boundary import periodic_ends
+from walk_optimizer.transcription.chain import assemble
+from walk_optimizer.transcription.layout import STATE_WIDTH
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
 from walk_optimizer.transcription.phase_bounds import (
     PhaseLayout,
@@ -23,6 +23,7 @@ from walk_optimizer.transcription.phase_bounds import (
 from walk_optimizer.transcription.problems import spring_bounds, state_bounds
 from walk_optimizer.transcription.program import Nlp, Problem
 from walk_optimizer.transcription.scaling import point_units, spring_units, torque_unit
+from walk_optimizer.transcription.stage import Stage
 from walk_optimizer.transcription.tableau import STAGES
 
 FloatArray = NDArray[np.float64]
@@ -163,7 +164,7 @@ class RefinedProblem:
 
 def state_before_step(walker: WalkerParameters, state: FloatArray) -> FloatArray:
     """Return the state (12,) before the next step's impact: legs relabelled, hip back by the step length."""
-    function = compiled(boundary_functions)["boundary_value"]
+    function = periodic_ends().functions["periodic_value"]
     units = np.array(point_units(walker)[:STATE_WIDTH], dtype=float)
     before: FloatArray = np.asarray(function(state / units, walker.vector())).ravel()[:STATE_WIDTH] * units
     return before
@@ -183,7 +184,7 @@ def _assembled(layout: PhaseLayout) -> Nlp:
         kept = kept_rows(interval_bounds(phase.modes, landing_after(layout, index)))
         stages.append(Stage(radau.interval_kind(), shared, kept))
     durations = np.concatenate([np.zeros(2), np.ones(len(layout))])
-    return assemble(stages, durations.size, durations[None])
+    return assemble(stages, periodic_ends(), durations.size, durations[None])
 
 
 def _chain_bounds(layout: PhaseLayout) -> tuple[FloatArray, FloatArray]:
