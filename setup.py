@@ -11,6 +11,8 @@ ROS = [
     "ros-jazzy-rclpy[fastrtps]>=7.1,<8",
     "ros-jazzy-builtin-interfaces>=2.0,<3",
     "ros-jazzy-std-msgs>=5.3,<6",
+    "ros-jazzy-std-srvs>=5.3,<6",
+    "ros-jazzy-geometry-msgs>=5.3,<6",
     "ros-jazzy-sensor-msgs>=5.3,<6",
     "ros-jazzy-trajectory-msgs>=5.3,<6",
 ]
