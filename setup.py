@@ -10,11 +10,13 @@ SHARE = "share/walk_optimizer"
 ROS = [
     "ros-jazzy-rclpy[fastrtps]>=7.1,<8",
     "ros-jazzy-builtin-interfaces>=2.0,<3",
+    "ros-jazzy-diagnostic-msgs>=5.3,<6",
     "ros-jazzy-std-msgs>=5.3,<6",
     "ros-jazzy-std-srvs>=5.3,<6",
     "ros-jazzy-geometry-msgs>=5.3,<6",
     "ros-jazzy-sensor-msgs>=5.3,<6",
     "ros-jazzy-trajectory-msgs>=5.3,<6",
+    "ros-jazzy-visualization-msgs>=5.3,<6",
 ]
 
 # What CMake needs to build walk_optimizer_interfaces. The generators do not require all of the
@@ -35,13 +37,15 @@ INTERFACES = [
 
 FIGURES = ["matplotlib>=3.8,<4"]
 
-# pin (Pinocchio) is an independent rigid-body library, rosbags an independent reader of bags.
+# pin (Pinocchio) is an independent rigid-body library, rosbags an independent reader of bags, xacro what
+# the walker's macro file is for.
 TEST = [
     "pytest>=8",
     "pytest-timeout>=2.3",
     "hypothesis>=6.100",
     "rosbags>=0.10",
     "pin>=3",
+    "xacro>=2,<3",
 ]
 
 LINT = ["ruff>=0.11", "mypy>=1.15", "types-PyYAML"]

@@ -27,6 +27,7 @@ LAYERS = (
     ("gait_files", "gait_csv"),
     ("library_entries", "library", "verification", "report_table"),
     ("profile", "references", "reference_check", "background"),
+    ("description", "scene"),
     ("figures", "reproduction"),
     ("recording",),
     ("nodes", "cli"),
