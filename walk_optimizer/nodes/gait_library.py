@@ -1,6 +1,7 @@
 """Node `gait_library`: serves the gait table at once, and asks the optimiser for what it lacks."""
 
 import sys
+from collections import Counter
 from pathlib import Path
 
 from walk_optimizer_interfaces.msg import GaitTable
@@ -8,13 +9,15 @@ from walk_optimizer_interfaces.srv import GetGait, ListGaits, OptimizeGait, Rebu
 
 from walk_optimizer.errors import GaitNotFoundError, SolveFailedError, WalkOptimizerError
 from walk_optimizer.gait import Gait
-from walk_optimizer.library import GaitLibrary, Selection
+from walk_optimizer.library import GaitLibrary, Selection, Source
 from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.nodes.conversions import gait_from_message, gait_to_message, summary_to_message
+from walk_optimizer.nodes.diagnostics import Finding, Level
+from walk_optimizer.nodes.lifecycle import ManagedNode
+from walk_optimizer.nodes.log_text import with_fields
 from walk_optimizer.nodes.parameters import Setting
 from walk_optimizer.nodes.qos import LATCHED
 from walk_optimizer.nodes.running import run_node
-from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.walker_setting import WALKER_FILE, walker_of
 from walk_optimizer.request import GaitRequest, gait_table_settings
 
@@ -47,15 +50,22 @@ SETTINGS = [
 ]
 
 
-class GaitLibraryNode(SuiteNode):
+class GaitLibraryNode(ManagedNode):
     """Offers `~/get_gait`, `~/list_gaits`, `~/rebuild` and the latched topic `~/table`.
 
     Does not own how gaits are found and stored (`library.GaitLibrary`).
     """
 
     def __init__(self) -> None:
-        """Load the library and offer it."""
+        """Declare the parameters; `configure` does the rest."""
         super().__init__("gait_library", SETTINGS)
+
+    def configure(self) -> None:
+        """Load the library and offer it.
+
+        Raises:
+            GaitFileError: the cache folder is missing, a symbolic link or not writable.
+        """
         folder = self.parameters["cache_folder"]
         walker = walker_of(self.parameters["walker_file"])
         self._library = GaitLibrary(walker, Path(folder) if folder else None, writable=True)
@@ -66,8 +76,18 @@ class GaitLibraryNode(SuiteNode):
         self.serve(GetGait, "~/get_gait", self._get)
         self.serve(ListGaits, "~/list_gaits", self._list)
         self.serve(Rebuild, "~/rebuild", self._rebuild)
+        self.diagnostics.add("gaits", self._gaits_finding)
+        self.diagnostics.add("optimizer", self._optimizer_finding)
+
+    def activate(self) -> None:
+        """Publish the table."""
         self._publish_table()
-        self.get_logger().info(f"ready with {len(self._library.gaits())} gaits")
+        self.get_logger().info(with_fields("ready", gaits=len(self._library.gaits())))
+
+    def cleanup(self) -> None:
+        """Say nothing more about the library; `configure` reads it anew."""
+        self.diagnostics.remove("gaits")
+        self.diagnostics.remove("optimizer")
 
     async def _get(self, request: GetGait.Request, response: GetGait.Response) -> None:
         wanted = self._wanted(request.speed, request.spring_mode)
@@ -136,6 +156,27 @@ class GaitLibraryNode(SuiteNode):
             stamp=self.get_clock().now().to_msg(),
             walker=self._library.walker.fingerprint(),
             gaits=[summary_to_message(summary) for summary in self._library.summaries()],
+        )
+
+    def _gaits_finding(self) -> Finding:
+        entries, problems = self._library.entries(), self._library.problems()
+        sources = Counter(entry.source.value for entry in entries)
+        values: dict[str, object] = {source.value: sources[source] for source in Source}
+        values |= {"set_aside": len(problems), "folder": self._library.folder}
+        if problems:
+            return Finding(Level.WARN, f"{len(problems)} gait files set aside: {problems[0]}", values)
+        if not entries:
+            return Finding(Level.WARN, "no gaits yet: every request has to be solved", values)
+        return Finding(Level.OK, f"{len(entries)} gaits", values)
+
+    def _optimizer_finding(self) -> Finding:
+        service = self._optimizer.service_name
+        if self._optimizer.service_is_ready():
+            return Finding(Level.OK, "the optimizer is there", {"service": service})
+        return Finding(
+            Level.WARN,
+            "the optimizer is not there: only gaits of the library can be had; start gait_optimizer",
+            {"service": service},
         )
 
 

@@ -22,22 +22,28 @@ _LAST_WORDS = 0.2
 
 
 def run_node(make: Callable[[], SuiteNode]) -> int:
-    """Run a node until it is told to stop, and return the exit code."""
+    """Run a node until it is told to stop, and return the exit code: 1 where it can't start."""
     stop = _stop_on_signals()
     try:
         # rclpy's own handlers would take the context away before the bag is closed.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = make()
     except (WalkOptimizerError, ParameterException, RuntimeError) as error:
-        print(f"can't start: {error}", file=sys.stderr)
         rclpy.try_shutdown()
-        return 1
+        return _refused(error)
     try:
         _spin(node, stop)
+    except WalkOptimizerError as error:  # Of `begin`: those of callbacks are answers.
+        return _refused(error)
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _refused(error: Exception) -> int:
+    print(f"can't start: {error}", file=sys.stderr)
+    return 1
 
 
 def _stop_on_signals() -> threading.Event:

@@ -12,6 +12,8 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from walk_optimizer.errors import WalkOptimizerError
+from walk_optimizer.nodes.diagnostics import Diagnostics
+from walk_optimizer.nodes.diagnostics_publisher import DiagnosticsPublisher
 from walk_optimizer.nodes.parameters import NodeParameters, Setting
 from walk_optimizer.nodes.qos import SERVICE
 
@@ -39,9 +41,16 @@ class SuiteNode(Node):
         self.parameters = NodeParameters(self, settings)
         # Waiting goes by the wall, also in a simulation that stands still.
         self._wall = Clock(clock_type=ClockType.STEADY_TIME)
+        self._waits: set[Future] = set()
+        self.diagnostics = Diagnostics()
+        DiagnosticsPublisher(self, self.diagnostics, self._wall, self.group)
 
     def begin(self) -> None:
-        """Start what needs an executor; called once, before it spins."""
+        """Start what needs an executor; called once, before it spins.
+
+        Raises:
+            WalkOptimizerError: the node can't start.
+        """
 
     def close(self) -> None:
         """Give back what the node holds beside ROS entities; called before it is destroyed."""
@@ -80,18 +89,25 @@ class SuiteNode(Node):
         if executor is not None:
             executor.create_task(function, *arguments)
 
+    def end_waits(self, error: WalkOptimizerError) -> None:
+        """Have all waits that are under way raise an error."""
+        for future in tuple(self._waits):
+            future.set_exception(error)
+
     async def finished(self, work: "concurrent.futures.Future[Any]") -> None:
         """Wait until work of another thread or process is done."""
         done = Future()
         work.add_done_callback(lambda _: self.later(done.set_result, None))
-        await done
+        await self._wait(done)
 
     async def sleep(self, seconds: float) -> None:
         """Wait for some time in [s] of the wall clock."""
         done = Future()
         timer = self.create_timer(seconds, lambda: done.set_result(None), self.group, self._wall)
-        await done
-        self.destroy_timer(timer)
+        try:
+            await self._wait(done)
+        finally:
+            self.destroy_timer(timer)
 
     async def call(self, client: Client, request: Any, timeout: float) -> Any:
         """Return the response of another node.
@@ -108,22 +124,26 @@ class SuiteNode(Node):
             raise ServiceUnavailableError(f"service {client.service_name} is not there; is its node running?")
         future = client.call_async(request)
         begin = self._wall.now()
-        reasons = []
 
         def watch() -> None:
             if not client.service_is_ready():
-                reasons.append("went away")
+                future.set_exception(_unavailable(client, "went away"))
             elif (self._wall.now() - begin).nanoseconds * 1e-9 > timeout:
-                reasons.append(f"gave no answer within {timeout:g} s")
-            if reasons:
-                future.cancel()
+                future.set_exception(_unavailable(client, f"gave no answer within {timeout:g} s"))
 
         timer = self.create_timer(_WATCH_PERIOD, watch, self.group, self._wall)
-        response = await future
-        self.destroy_timer(timer)
-        if response is None:
-            raise ServiceUnavailableError(f"service {client.service_name} {reasons[0]}; ask again")
-        return response
+        try:
+            return await self._wait(future)
+        finally:
+            self.destroy_timer(timer)
+
+    async def _wait(self, future: Future) -> Any:
+        """Return the result of a future; `end_waits` ends that too."""
+        self._waits.add(future)
+        try:
+            return await future
+        finally:
+            self._waits.discard(future)
 
     async def _offered(self, client: Client, patience: float = 3.0) -> bool:
         """Return whether a service is there, after giving discovery some time in [s]."""
@@ -132,3 +152,7 @@ class SuiteNode(Node):
                 return True
             await self.sleep(_WATCH_PERIOD)
         return client.service_is_ready()
+
+
+def _unavailable(client: Client, what: str) -> ServiceUnavailableError:
+    return ServiceUnavailableError(f"service {client.service_name} {what}; ask again")
