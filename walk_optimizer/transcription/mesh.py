@@ -51,6 +51,11 @@ class Mesh:
         return sum(part.size for part in self.parts)
 
     @property
+    def layout(self) -> tuple[tuple[Phase, int], ...]:
+        """Phases with their numbers of intervals."""
+        return tuple((phase, part.size) for phase, part in zip(self.phases, self.parts, strict=True))
+
+    @property
     def phase_of_interval(self) -> NDArray[np.int64]:
         """Index of the phase of each interval, (n,)."""
         return np.repeat(np.arange(len(self.phases)), [part.size for part in self.parts])

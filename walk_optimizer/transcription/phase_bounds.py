@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from walk_optimizer.contact.schedule import FootMode
 from walk_optimizer.transcription import radau
 from walk_optimizer.transcription.layout import STATE_WIDTH
-from walk_optimizer.transcription.phases import Modes, Phase
+from walk_optimizer.transcription.phases import Landing, Modes, Phase
 from walk_optimizer.transcription.tableau import STAGES
 
 FloatArray = NDArray[np.float64]
@@ -26,14 +26,23 @@ def kept_rows(bounds: RowBounds) -> NDArray[np.bool_]:
     return np.isfinite(bounds[0]) | np.isfinite(bounds[1])
 
 
-def landing_after(layout: PhaseLayout, index: int) -> tuple[bool, bool]:
-    """Return which feet land at the end of a phase; the legs change names at the last."""
-    last = index == len(layout) - 1
-    first, second = layout[0 if last else index + 1][0].landing
-    return (second, first) if last else (first, second)
+def stage_bounds(layout: PhaseLayout, landing: Landing) -> list[RowBounds]:
+    """Return the bounds of each stage's rows: of each phase its impact, where it has one, and intervals.
+
+    Args:
+        layout: The phases.
+        landing: Which feet land at the end of the last one.
+    """
+    bounds: list[RowBounds] = []
+    landings = [*(phase.landing for phase, _ in layout[1:]), landing]
+    for (phase, intervals), landing_after in zip(layout, landings, strict=True):
+        bounds += [impact_bounds(phase)] * phase.begins_with_impact
+        bounds += [interval_bounds(phase.modes)] * (intervals - 1)
+        bounds.append(interval_bounds(phase.modes, landing_after))
+    return bounds
 
 
-def interval_bounds(modes: Modes, landing: tuple[bool, bool] = (False, False)) -> RowBounds:
+def interval_bounds(modes: Modes, landing: Landing = (False, False)) -> RowBounds:
     """Return the bounds of an interval's rows: dynamics, then contacts at each node.
 
     The impact after it pins the gap of a landing foot, so the last node must not bound it once more.

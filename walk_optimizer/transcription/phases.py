@@ -10,6 +10,8 @@ from walk_optimizer.contact.schedule import FootMode, Schedule
 # A contact that lasts no longer than this many grid points is an impulse on the refined grid.
 INSTANT_POINTS = 2
 Modes = tuple[FootMode, FootMode]
+# Which feet land.
+Landing = tuple[bool, bool]
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,7 @@ class Phase:
 
     modes: Modes
     impact: Modes
-    landing: tuple[bool, bool]
+    landing: Landing
     start: float
 
     @property
