@@ -1,0 +1,131 @@
+"""The floating base is found from joint positions alone, and feet, paths and forces are the gait's."""
+
+import numpy as np
+import pytest
+
+from walk_optimizer.library import GaitLibrary
+from walk_optimizer.mechanics import foot_arm
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.references import cycle_reference
+from walk_optimizer.scene.gait import ShownGait
+from walk_optimizer.scene.paths import Trail, paths_ahead
+from walk_optimizer.scene.tracking import WalkTracker
+
+WALKER = WalkerParameters()
+SPEED, MODE = 0.32, "stiffness_and_equilibrium"
+
+
+@pytest.fixture(scope="module", params=["refined", "euler"])
+def solved(request):
+    """A packaged gait, and it as displays show it, with and without its refinement."""
+    gait, _ = GaitLibrary(WALKER).find(SPEED, MODE, "nearest")
+    refined = gait.refined if request.param == "refined" else None
+    shown = ShownGait(WALKER, gait.trajectory, gait.step_length, gait.request.step_time, refined)
+    return gait, shown
+
+
+def walk(profile, rate, duration, begin=0.0):
+    """References of an endless walk, and where its base is."""
+    for time in begin + np.arange(0.0, duration, 1 / rate):
+        cycles, rest = divmod(time, 2 * profile.step_time)
+        reference = cycle_reference(profile, rest)
+        yield reference, reference.base + np.array([2 * cycles * profile.step_length, 0.0])
+
+
+@pytest.mark.parametrize("rate", [200.0, 30.0, 3.1])
+def test_the_base_is_the_walks_over_ten_steps_at_any_rate(solved, rate):
+    _, shown = solved
+    tracker = WalkTracker(WALKER)
+    tracker.follow(shown)
+    offsets = []
+    for reference, base in walk(shown.profile, rate, 10 * shown.profile.step_time, begin=0.123):
+        pose = tracker.take(reference.position)
+        # The end of a step is the start of the next.
+        late = pose.place.time - reference.time + (pose.stance - reference.step % 2) * shown.profile.step_time
+        assert (late + 0.1) % (2 * shown.profile.step_time) == pytest.approx(0.1, abs=1e-4)
+        offsets.append(pose.base - base)
+    # The tracker begins where it is told nothing of, and does not drift from there.
+    assert np.ptp(offsets, axis=0).max() < 1e-4
+
+
+def test_the_standing_foot_stands_and_a_foot_lands_a_step_ahead(solved):
+    _, shown = solved
+    tracker = WalkTracker(WALKER)
+    tracker.follow(shown)
+    stood = {}
+    for reference, _ in walk(shown.profile, 200.0, 4 * shown.profile.step_time, begin=0.01):
+        pose = tracker.take(reference.position)
+        stood.setdefault(round(pose.feet[pose.stance, 0], 3), pose.feet[pose.stance])
+        assert pose.feet[:, 1].min() > -1e-4
+    places = np.array(list(stood.values()))
+    assert places[:, 0] == pytest.approx(shown.profile.step_length * np.arange(len(places)), abs=1e-3)
+    assert places[:, 1] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_without_a_gait_the_lowest_foot_carries_the_walker(solved):
+    _, shown = solved
+    tracker = WalkTracker(WALKER)
+    poses = [tracker.take(one.position) for one, _ in walk(shown.profile, 500.0, 6 * shown.profile.step_time)]
+    assert all(pose.place is None for pose in poses)
+    walked = poses[-1].base[0] - poses[0].base[0]
+    assert walked == pytest.approx(6 * shown.profile.step_length, rel=0.03)
+
+
+def test_references_off_the_gait_have_no_place_in_it_and_the_base_goes_on(solved):
+    _, shown = solved
+    tracker = WalkTracker(WALKER)
+    tracker.follow(shown)
+    references = [one for one, _ in walk(shown.profile, 500.0, shown.profile.step_time / 2)]
+    before = [tracker.take(reference.position) for reference in references][-1]
+    bent = references[-1].position + np.array([0.0, 0.0, 0.01, 0.0])
+    after = tracker.take(bent)
+    assert after.place is None
+    assert after.base == pytest.approx(before.base, abs=1e-9)
+
+
+def test_ground_reaction_is_the_gaits(solved):
+    gait, shown = solved
+    if "radau" in shown.profile.method:
+        trajectory = gait.refined.trajectory
+        for time in np.linspace(0.01, trajectory.step_time - 0.01, 7):
+            assert shown.reaction(time).ravel() == pytest.approx(trajectory.force(*trajectory.locate(time)))
+    else:
+        for index in (1, 50, 199):
+            time = gait.trajectory.time[index] - 1e-6
+            assert shown.reaction(time).ravel() == pytest.approx(gait.trajectory.net_reaction()[:, index])
+
+
+def test_paths_ahead_begin_at_the_feet_and_end_where_they_land(solved):
+    _, shown = solved
+    tracker = WalkTracker(WALKER)
+    tracker.follow(shown)
+    for reference, _ in walk(shown.profile, 30.0, 3 * shown.profile.step_time, begin=0.05):
+        pose = tracker.take(reference.position)
+        paths = paths_ahead(shown, pose, pose.place)
+        stride = shown.profile.step_length
+        standing = pose.feet[pose.stance, 0]
+        for side, path in enumerate(paths):
+            assert path[:, 0] == pytest.approx(pose.feet[side], abs=1e-4)
+            steps = 2 if side == pose.stance else 1
+            assert path[:, -1] == pytest.approx([standing + steps * stride, 0.0], abs=1e-3)
+            assert path[1].min() > -1e-3
+
+
+def test_the_swing_path_is_that_of_the_model(solved):
+    _, shown = solved
+    time = shown.path_times[20]
+    q = shown.profile.sample(time).q[:, None]
+    expected = foot_arm(WALKER, q, 1).position - foot_arm(WALKER, q, 0).position
+    assert shown.swing_path[:, 20] == pytest.approx(expected[:, 0])
+
+
+def test_a_trail_forgets_what_is_old_and_a_clock_that_went_back(solved):
+    _, shown = solved
+    tracker, trail = WalkTracker(WALKER), Trail(0.5)
+    times = np.arange(0.0, 2.0, 0.1)
+    for time in times:
+        trail.add(time, tracker.take(shown.profile.sample(time % 0.5).q[2:]))
+    left, right = trail.paths()
+    assert left.shape == right.shape == (2, 6)
+    trail.add(0.0, tracker.take(shown.profile.sample(0.0).q[2:]))
+    assert trail.paths()[0].shape == (2, 1)

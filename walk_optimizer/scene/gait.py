@@ -1,0 +1,117 @@
+"""A gait as displays need it: a place in its cycle for joint positions, feet, ground reactions."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.gait import RefinedGait, Trajectory
+from walk_optimizer.mechanics import foot_arm
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.profile import EulerProfile, RefinedProfile, StepProfile, most_accurate
+from walk_optimizer.references import Cycle, sample_cycle
+
+FloatArray = NDArray[np.float64]
+
+# The cycle is tabulated at this rate in [Hz] and straight between two entries.
+_RATE = 1000.0
+# Points of a foot's path over a step.
+_PATH_POINTS = 60
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in the cycle of a gait.
+
+    Attributes:
+        time: Since the start of the step in [s].
+        stance: Side that stands, 0 left, 1 right.
+        deviation: Largest deviation of a joint from the gait there in [rad].
+    """
+
+    time: float
+    stance: int
+    deviation: float
+
+
+class ShownGait:
+    """A gait and its walker."""
+
+    def __init__(
+        self,
+        walker: WalkerParameters,
+        trajectory: Trajectory,
+        step_length: float,
+        step_time: float,
+        refined: RefinedGait | None,
+    ) -> None:
+        """Take a gait.
+
+        Args:
+            walker: That walks.
+            trajectory: On the report's grid.
+            step_length: Of that trajectory in [m].
+            step_time: In [s].
+            refined: Shown instead, where it is certified.
+        """
+        self.walker = walker
+        self._trajectory, self._refined = trajectory, refined
+        self.profile: StepProfile = most_accurate(EulerProfile(trajectory, step_length, step_time), refined)
+
+    @cached_property
+    def _cycle(self) -> Cycle:
+        return sample_cycle(self.profile, _RATE)
+
+    def locate(self, position: FloatArray) -> Place:
+        """Return the place of the cycle that is nearest to joint positions (4,) in [rad]."""
+        table = self._cycle.position
+        nearest = int(np.argmin(np.sum((table - position[:, None]) ** 2, axis=0)))
+        time, deviation = min(
+            (self._on_chord(start, position) for start in (nearest - 1, nearest)),
+            key=lambda found: found[1],
+        )
+        stance = int(time >= self.profile.step_time)
+        return Place(time - stance * self.profile.step_time, stance, deviation)
+
+    def _on_chord(self, start: int, position: FloatArray) -> tuple[float, float]:
+        """Return time and deviation of the nearest place between two entries of the table."""
+        times, table = self._cycle.time, self._cycle.position
+        start = min(max(start, 0), times.size - 2)
+        along = table[:, start + 1] - table[:, start]
+        ahead = float(along @ (position - table[:, start])) / max(float(along @ along), 1e-30)
+        part = min(max(ahead, 0.0), 1.0)
+        deviation = float(np.max(np.abs(table[:, start] + part * along - position)))
+        return float(times[start] + part * (times[start + 1] - times[start])), deviation
+
+    @cached_property
+    def swing_path(self) -> FloatArray:
+        """The foot of leg 2 over a step, from where the foot of leg 1 stands: x, y in [m], (2, K)."""
+        q = np.column_stack([self.profile.sample(time).q for time in self.path_times.tolist()])
+        stance, swing = (foot_arm(self.walker, q, leg).position for leg in range(2))
+        path: FloatArray = swing - stance
+        return path
+
+    @cached_property
+    def path_times(self) -> FloatArray:
+        """Times of `swing_path` since the start of the step in [s], (K,)."""
+        return np.linspace(0.0, self.profile.step_time, _PATH_POINTS)
+
+    @property
+    def stride(self) -> FloatArray:
+        """Where a foot lands, from the one that stands: x, y in [m], (2,)."""
+        landing: FloatArray = self.swing_path[:, -1]
+        return landing
+
+    def reaction(self, time: float) -> FloatArray:
+        """Return the ground reactions in [N] at a time in [s] of the step.
+
+        Returns:
+            (2, 2): rows are the foot that stands and the one that swings, columns x and y.
+        """
+        if self._refined is not None and isinstance(self.profile, RefinedProfile):
+            refined = self._refined.trajectory
+            return refined.force(*refined.locate(time)).reshape(2, 2)
+        index = int(np.searchsorted(self._trajectory.time, time))
+        net = self._trajectory.net_reaction()
+        return net[:, min(index, net.shape[1] - 1)].reshape(2, 2)
