@@ -3,11 +3,12 @@
 `make` runs this before every target. Each step leaves a stamp with the digest of what it depends on,
 so a second run only compares digests.
 
-The wheels bring the whole of rclpy, but three things are left to do:
+The wheels bring the whole of rclpy, but four things are left to do:
 
 - their CMake files name the include folders of the machine that built them (`rewrite_include_paths`);
-- `walk_optimizer_interfaces` has to be generated and compiled (`build_interfaces`), and an editable
-  install leaves out data files, so the share folder is made of links (`link_share_files`);
+- `walk_optimizer_interfaces` has to be generated and compiled (`build_interfaces`), and so has the message
+  of tf2_msgs, which no wheel holds (`build_missing_messages`);
+- an editable install leaves out data files, so the share folder is made of links (`link_share_files`);
 - processes need AMENT_PREFIX_PATH to find packages (`write_environment_hook`). LD_LIBRARY_PATH is set
   by a start-up hook of the wheels themselves.
 """
@@ -28,8 +29,8 @@ ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 PYTHON = VENV / "bin" / "python"
 INTERFACES = ROOT / "walk_optimizer_interfaces"
-SHARED_FOLDERS = ("config", "launch", "urdf")
-BUILD = VENV / "build" / "walk_optimizer_interfaces"
+TF2_MESSAGES = ROOT / "tools" / "tf2_msgs"
+SHARED_FOLDERS = ("config", "foxglove", "launch", "rviz", "security", "urdf")
 
 # The wheels exist for these versions of Python.
 OLDEST = (3, 11)
@@ -50,6 +51,7 @@ def main() -> int:
         make_environment()
         install_packages()
         build_interfaces()
+        build_missing_messages()
         link_share_files()
     except BootstrapError as error:
         print(f"bootstrap: {error}", file=sys.stderr)
@@ -124,26 +126,44 @@ def write_environment_hook() -> None:
 
 def build_interfaces() -> None:
     """Generate, compile and install walk_optimizer_interfaces into `.venv`."""
-    files = [path for path in INTERFACES.rglob("*") if path.is_file()]
+    build_package(INTERFACES, "interfaces")
+
+
+def build_missing_messages() -> None:
+    """Do the same with our copy of tf2_msgs, unless a package of that name is there from elsewhere."""
+    ours = (VENV / ".tf2_msgs.stamp").exists()
+    if ours or not (VENV / "share" / TF2_MESSAGES.name).exists():
+        build_package(TF2_MESSAGES, "tf2_msgs")
+
+
+def build_package(package: Path, step: str) -> None:
+    """Generate, compile and install an interface package into `.venv`.
+
+    Args:
+        package: Its folder.
+        step: Name of its stamp.
+    """
+    files = [path for path in package.rglob("*") if path.is_file()]
     state = digest([*files, ROOT / "setup.py"])
-    if is_done("interfaces", state):
+    if is_done(step, state):
         return
     cmake = require("cmake")
     require("c++")
-    say("building walk_optimizer_interfaces")
+    say(f"building {package.name}")
     environment = os.environ | {
         "AMENT_PREFIX_PATH": str(VENV),
         "CMAKE_PREFIX_PATH": str(VENV),
         "PATH": f"{VENV / 'bin'}{os.pathsep}{os.environ['PATH']}",
     }
     options = [f"-DCMAKE_INSTALL_PREFIX={VENV}", f"-DPython3_EXECUTABLE={PYTHON}", "-DBUILD_TESTING=OFF"]
+    build = VENV / "build" / package.name
     for arguments in (
-        ["-S", INTERFACES, "-B", BUILD, *options],
-        ["--build", BUILD, "--parallel", str(os.cpu_count() or 1)],
-        ["--install", BUILD],
+        ["-S", package, "-B", build, *options],
+        ["--build", build, "--parallel", str(os.cpu_count() or 1)],
+        ["--install", build],
     ):
         run_quietly([cmake, *arguments], environment)
-    mark_done("interfaces", state)
+    mark_done(step, state)
 
 
 def link_share_files() -> None:
