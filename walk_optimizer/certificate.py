@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.gait import Certificate, CertificateEntry, Trajectory
-from walk_optimizer.mechanics import Mechanics, foot_arm, mechanics_at
+from walk_optimizer.mechanics import Mechanics, foot_arm, horizontal_and_vertical, mechanics_at
 from walk_optimizer.model.kinematics import RELABELLED
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest
@@ -18,10 +18,16 @@ _KINEMATIC_TOLERANCE = 1e-6
 _BOUND_TOLERANCE = 1e-6
 
 
-def _state_before(q: FloatArray, p: FloatArray, step_length: float) -> tuple[FloatArray, FloatArray]:
-    """Return coordinates and momenta at the points before each, the first relabelled from the last."""
+def _state_before(q: FloatArray, p: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return coordinates and momenta at the points before each, the first relabelled from the last.
+
+    Args:
+        q: Coordinates, (6, N).
+        p: Momenta, (6, N).
+        step: Length and rise of the step in [m], (2,).
+    """
     first_q, first_p = q[list(RELABELLED), -1], p[list(RELABELLED), -1]
-    first_q[0] -= step_length
+    first_q[:2] -= step
     return np.column_stack([first_q, q[:, :-1]]), np.column_stack([first_p, p[:, :-1]])
 
 
@@ -31,16 +37,17 @@ def landing_distance(walker: WalkerParameters, trajectory: Trajectory) -> float:
 
 
 def _dynamics_defects(
-    mechanics: Mechanics, trajectory: Trajectory, interval: float, step_length: float
+    walker: WalkerParameters, mechanics: Mechanics, trajectory: Trajectory, interval: float, step: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the defects of implicit Euler per unit of time: velocities (6, N) and forces (6, N)."""
-    q_before, p_before = _state_before(trajectory.q, trajectory.p, step_length)
-    rate = mechanics.momentum_rate(trajectory.u, trajectory.net_reaction())
+    q_before, p_before = _state_before(trajectory.q, trajectory.p, step)
+    reaction = horizontal_and_vertical(walker, trajectory.net_reaction())
+    rate = mechanics.momentum_rate(trajectory.u, reaction)
     return (trajectory.q - q_before) / interval - mechanics.qdot, (trajectory.p - p_before) / interval - rate
 
 
 def _contact_entries(
-    walker: WalkerParameters, mechanics: Mechanics, trajectory: Trajectory
+    walker: WalkerParameters, mechanics: Mechanics, trajectory: Trajectory, tread: float
 ) -> list[CertificateEntry]:
     """Return penetration, friction cone and the complementarity products of eqs. (5a) to (5d)."""
     products: dict[str, list[FloatArray]] = {}
@@ -48,8 +55,8 @@ def _contact_entries(
     for leg, arm in enumerate(mechanics.feet):
         forward, backward, normal = trajectory.reaction[3 * leg : 3 * leg + 3]
         gamma = trajectory.slip_speed[leg]
-        gap = arm.position[1]
-        slip = mechanics.foot_velocity(leg)[0]
+        gap = walker.terrain.gap(arm.position, tread)
+        slip = walker.terrain.along_and_normal(mechanics.foot_velocity(leg))[0]
         cone = walker.friction_coefficient * normal - forward - backward
         for name, product in {
             "normal_complementarity": gap * normal,
@@ -103,6 +110,15 @@ def spring_entries(walker: WalkerParameters, mode: SpringMode, spring: KneeSprin
     ]
 
 
+def tread_entries(
+    walker: WalkerParameters, request: GaitRequest, step_length: float
+) -> list[CertificateEntry]:
+    """Return how far from the middle of a tread the foot lands; nothing where there are no stairs."""
+    if not walker.terrain.step_up:
+        return []
+    return [CertificateEntry("tread", abs(step_length - request.step_length), "m", _KINEMATIC_TOLERANCE)]
+
+
 def certify(
     walker: WalkerParameters, request: GaitRequest, spring: KneeSpring, trajectory: Trajectory
 ) -> Certificate:
@@ -120,7 +136,8 @@ def certify(
     """
     mechanics = mechanics_at(walker, spring, trajectory.q, trajectory.p)
     step_length = landing_distance(walker, trajectory)
-    velocities, forces = _dynamics_defects(mechanics, trajectory, request.interval, step_length)
+    step = np.array([step_length, walker.terrain.height(step_length, request.step_length)])
+    velocities, forces = _dynamics_defects(walker, mechanics, trajectory, request.interval, step)
     force_tolerance = RELATIVE_TOLERANCE * walker.weight
     shortfall = request.speed - step_length / request.step_time
     motion, load = "m/s, rad/s", "N, N m"
@@ -132,7 +149,8 @@ def certify(
         ),
         CertificateEntry("periodicity_force", _excess(np.abs(forces[:, :1])), load, force_tolerance),
         CertificateEntry("speed", _excess(shortfall), "m/s", _KINEMATIC_TOLERANCE),
-        *_contact_entries(walker, mechanics, trajectory),
+        *tread_entries(walker, request, step_length),
+        *_contact_entries(walker, mechanics, trajectory, request.step_length),
         *_bound_entries(walker, trajectory),
         *spring_entries(walker, request.spring_mode, spring),
     ]

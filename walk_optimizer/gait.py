@@ -103,7 +103,7 @@ class Trajectory:
         return np.vstack([self.q, self.p, self.u, self.reaction, self.slip_speed])
 
     def net_reaction(self) -> FloatArray:
-        """Return the ground reactions x, y of foot 1, then of foot 2, in [N], (4, N)."""
+        """Return the ground reactions along and normal to the ground, foot 1, then 2, in [N], (4, N)."""
         forward, backward, normal = self.reaction[[0, 3]], self.reaction[[1, 4]], self.reaction[[2, 5]]
         tangential = forward - backward
         return np.stack([tangential, normal], axis=1).reshape(4, -1)

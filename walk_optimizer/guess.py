@@ -33,17 +33,23 @@ def kinematic_guess(walker: WalkerParameters, request: GaitRequest, shape: Guess
     """Return a guess of all points, (23, N) in SI units, for a walk on stiff legs.
 
     The hip moves at constant speed on a circle about the stance foot, which stands at the origin;
-    the swing foot moves from one step length behind to one ahead on a cycloid. Momenta are those of
-    the implicit Euler grid, the stance foot carries the weight, and torques are zero.
+    the swing foot moves from one step length behind to one ahead on a cycloid. On a slope or stairs the
+    whole walk is turned about the stance foot, so that the swing foot lands at the height of the
+    ground. Momenta are those of the implicit Euler grid, the stance foot carries the weight, and
+    torques are zero.
     """
     phase = np.arange(request.points + 1) / request.points
     leg = walker.leg_length * (1 - shape.flexion)
-    hip_x = request.step_length * (phase - 0.5)
+    rise = float(walker.terrain.height(request.step_length, request.step_length))
+    stride = np.hypot(request.step_length, rise)
+    turned = np.array([[request.step_length, -rise], [rise, request.step_length]]) / stride
+    hip_x = stride * (phase - 0.5)
     # Steps up to two stretched legs are possible: where the bent leg is too short, the hip is on the ground.
     hip = np.array([hip_x, np.sqrt(np.maximum(leg**2 - hip_x**2, 0.0))])
     cycloid = phase - np.sin(2 * np.pi * phase) / (2 * np.pi)
-    swing_x = request.step_length * (2 * cycloid - 1)
+    swing_x = stride * (2 * cycloid - 1)
     swing = np.array([swing_x, shape.clearance * walker.leg_length * np.sin(np.pi * phase) ** 2])
+    hip, swing = turned @ hip, turned @ swing
     q = np.vstack([hip, _leg_angles(walker, -hip), _leg_angles(walker, swing - hip)])
     return _with_momenta(walker, request, q)
 

@@ -120,3 +120,15 @@ def mechanics_at(walker: WalkerParameters, spring: KneeSpring, q: FloatArray, p:
 def foot_arm(walker: WalkerParameters, q: FloatArray, leg: int) -> Arm:
     """Return the foot of leg `leg` + 1 at coordinates (6, N)."""
     return _leg(walker, q, leg)[2]
+
+
+def horizontal_and_vertical(walker: WalkerParameters, components: FloatArray) -> FloatArray:
+    """Return x, y of foot 1, then of foot 2, (4, N), of what is given along and normal to the ground."""
+    pairs = (walker.terrain.horizontal_and_vertical(components[rows]) for rows in ([0, 1], [2, 3]))
+    return np.concatenate(list(pairs))
+
+
+def along_and_normal(walker: WalkerParameters, vectors: FloatArray) -> FloatArray:
+    """Return components along and normal to the ground, (4, N), of x, y of foot 1, then of foot 2."""
+    pairs = (walker.terrain.along_and_normal(vectors[rows]) for rows in ([0, 1], [2, 3]))
+    return np.concatenate(list(pairs))

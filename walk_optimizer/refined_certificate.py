@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.certificate import RELATIVE_TOLERANCE, spring_entries
+from walk_optimizer.certificate import RELATIVE_TOLERANCE, spring_entries, tread_entries
 from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
-from walk_optimizer.mechanics import Mechanics, foot_arm, mechanics_at
+from walk_optimizer.mechanics import Mechanics, along_and_normal, foot_arm, mechanics_at
 from walk_optimizer.model.kinematics import RELABELLED
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.refined_trajectory import RefinedTrajectory
@@ -44,11 +44,12 @@ def certify_refined(walker: WalkerParameters, request: GaitRequest, gait: Refine
     entries = [
         *_collocation_entries(walker, trajectory, mechanics),
         CertificateEntry("interval_replay", error, "m, rad", _TOLERANCE),
-        *_jump_entries(walker, gait),
+        *_jump_entries(walker, request, gait),
         CertificateEntry("speed", _largest(np.maximum(shortfall, 0.0)), "m/s", _TOLERANCE),
-        CertificateEntry("landing", _landing_error(walker, gait), "m", _TOLERANCE),
-        *_contact_entries(walker, mechanics, forces),
-        *_bound_entries(walker, trajectory),
+        CertificateEntry("landing", _landing_error(walker, request, gait), "m", _TOLERANCE),
+        *tread_entries(walker, request, gait.step_length),
+        *_contact_entries(walker, request, mechanics, forces),
+        *_bound_entries(walker, request, trajectory),
         *spring_entries(walker, request.spring_mode, gait.spring),
     ]
     return Certificate(tuple(entries))
@@ -74,12 +75,15 @@ def _collocation_entries(
     ]
 
 
-def _jump_entries(walker: WalkerParameters, gait: RefinedGait) -> list[CertificateEntry]:
+def _jump_entries(
+    walker: WalkerParameters, request: GaitRequest, gait: RefinedGait
+) -> list[CertificateEntry]:
     """Return what the impacts leave over between the intervals, the last and the first included."""
     trajectory = gait.trajectory
     ends = np.roll(trajectory.states[:, -1], 1, axis=0).T
     ends[:, 0] = ends[[*RELABELLED, *(6 + row for row in RELABELLED)], 0]
     ends[0, 0] -= gait.step_length
+    ends[1, 0] -= walker.terrain.height(gait.step_length, request.step_length)
     starts = trajectory.states[:, 0].T
     mechanics = mechanics_at(walker, gait.spring, starts[:6], starts[6:])
     impulse = mechanics.generalized(trajectory.impulses.T)
@@ -93,22 +97,24 @@ def _jump_entries(walker: WalkerParameters, gait: RefinedGait) -> list[Certifica
 
 def _cone_excess(walker: WalkerParameters, forces: FloatArray) -> float:
     """Return how far forces or impulses (4, N) reach beyond their friction cones or pull."""
-    tangential, normal = forces[[0, 2]], forces[[1, 3]]
+    components = along_and_normal(walker, forces)
+    tangential, normal = components[[0, 2]], components[[1, 3]]
     excess = np.abs(tangential) - walker.friction_coefficient * normal
     return float(np.maximum(0.0, np.maximum(excess, -normal)).max())
 
 
-def _landing_error(walker: WalkerParameters, gait: RefinedGait) -> float:
+def _landing_error(walker: WalkerParameters, request: GaitRequest, gait: RefinedGait) -> float:
     """Return how far foot 2 lands from one step length ahead, or from the ground."""
     end = gait.trajectory.states[-1, -1][:6, None]
-    return _largest(foot_arm(walker, end, 1).position[:, 0] - np.array([gait.step_length, 0.0]))
+    ground = walker.terrain.height(gait.step_length, request.step_length)
+    return _largest(foot_arm(walker, end, 1).position[:, 0] - np.array([gait.step_length, ground]))
 
 
 def _contact_entries(
-    walker: WalkerParameters, mechanics: Mechanics, forces: FloatArray
+    walker: WalkerParameters, request: GaitRequest, mechanics: Mechanics, forces: FloatArray
 ) -> list[CertificateEntry]:
     """Return what the feet do at the nodes: those under load stand, none is below the ground."""
-    gaps = np.array([foot.position[1] for foot in mechanics.feet])
+    gaps = np.array([walker.terrain.gap(foot.position, request.step_length) for foot in mechanics.feet])
     loaded = np.array([forces[:2].any(axis=0), forces[2:].any(axis=0)])
     speeds = np.array([np.abs(mechanics.foot_velocity(leg)).max(axis=0) for leg in range(2)])
     force_tolerance = RELATIVE_TOLERANCE * walker.weight
@@ -120,11 +126,13 @@ def _contact_entries(
     ]
 
 
-def _bound_entries(walker: WalkerParameters, trajectory: RefinedTrajectory) -> list[CertificateEntry]:
+def _bound_entries(
+    walker: WalkerParameters, request: GaitRequest, trajectory: RefinedTrajectory
+) -> list[CertificateEntry]:
     """Return violations of joint limits and forward momentum at the nodes, and of what may lie between."""
     nodes = trajectory.states[:, 1:].reshape(-1, 12).T
     angle = _largest(_angle_excess(walker, nodes))
-    angles_between, dips_between = excess_between(walker, trajectory)
+    angles_between, dips_between = excess_between(walker, request.step_length, trajectory)
     tolerance = RELATIVE_TOLERANCE * walker.total_mass
     return [
         CertificateEntry("joint_limits", angle, "rad", _TOLERANCE),
@@ -134,11 +142,20 @@ def _bound_entries(walker: WalkerParameters, trajectory: RefinedTrajectory) -> l
     ]
 
 
-def excess_between(walker: WalkerParameters, trajectory: RefinedTrajectory) -> tuple[FloatArray, FloatArray]:
-    """Return how far each interval's polynomials leave the joint limits [rad] and the air [m], (n,) each."""
+def excess_between(
+    walker: WalkerParameters, step_length: float, trajectory: RefinedTrajectory
+) -> tuple[FloatArray, FloatArray]:
+    """Return how far each interval's polynomials leave the joint limits [rad] and the air [m], (n,) each.
+
+    Args:
+        walker: The walker.
+        step_length: Of the request, in [m].
+        trajectory: The refined step.
+    """
     pairs = ((index, place) for index in range(trajectory.intervals) for place in _PLACES_BETWEEN)
     between = np.array([trajectory.state(*pair) for pair in pairs]).T
-    dips = np.array([-foot_arm(walker, between[:6], leg).position[1] for leg in range(2)]).max(axis=0)
+    feet = (foot_arm(walker, between[:6], leg).position for leg in range(2))
+    dips = np.array([-walker.terrain.gap(foot, step_length) for foot in feet]).max(axis=0)
     shape = (trajectory.intervals, _PLACES_BETWEEN.size)
     angles = _angle_excess(walker, between).reshape(shape).max(axis=1)
     return angles, np.maximum(0.0, dips).reshape(shape).max(axis=1)

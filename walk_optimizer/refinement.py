@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.contact.schedule import FootMode, single_impact
 from walk_optimizer.gait import Certificate, Gait, RefinedGait
-from walk_optimizer.mechanics import foot_arm
+from walk_optimizer.mechanics import foot_arm, horizontal_and_vertical
 from walk_optimizer.model.parameters import KneeSpring
 from walk_optimizer.refined_certificate import BETWEEN_TOLERANCE, certify_refined, excess_between
 from walk_optimizer.refined_trajectory import RefinedTrajectory
@@ -99,7 +99,7 @@ class _Refinement:
             if best.trajectory is None:
                 return best
             errors = interval_errors(self.walker, best.spring, best.trajectory)
-            excess = np.max(excess_between(self.walker, best.trajectory), axis=0)
+            excess = np.max(excess_between(self.walker, self.request.step_length, best.trajectory), axis=0)
             best = replace(best, local_error=float(errors.max()))
             if best.local_error <= LOCAL_ERROR and excess.max() <= _SAFETY * BETWEEN_TOLERANCE:
                 return best
@@ -113,7 +113,9 @@ class _Refinement:
         made by its coarseness: plain single support may be as good or better.
         """
         trajectory = self.gait.trajectory
-        schedule = schedule_of(self.walker, trajectory.q, trajectory.p, trajectory.reaction)
+        schedule = schedule_of(
+            self.walker, self.request.step_length, trajectory.q, trajectory.p, trajectory.reaction
+        )
         own, plain = phases_of(schedule), phases_of(single_impact(trajectory.points))
         slips = any(mode > FootMode.STICK for phase in own for mode in (*phase.modes, *phase.impact))
         plans = [plain] if own == plain or slips or len(own) > _MOST_PHASES else [own, plain]
@@ -128,7 +130,7 @@ class _Refinement:
         trajectory = self.gait.trajectory
         durations = np.diff([phase.start for phase in mesh.phases] + [1.0]) * self.request.step_time
         nodes = mesh.node_times(durations)
-        forces = trajectory.net_reaction()
+        forces = horizontal_and_vertical(self.walker, trajectory.net_reaction())
         forces[:, :INSTANT_POINTS] = forces[:, INSTANT_POINTS : INSTANT_POINTS + 1]
 
         def at(rows: FloatArray, when: FloatArray) -> FloatArray:

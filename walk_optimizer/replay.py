@@ -20,6 +20,8 @@ from walk_optimizer.refined_trajectory import RefinedTrajectory
 FloatArray = NDArray[np.float64]
 
 _TOLERANCES = {"rtol": 1e-10, "atol": 1e-10}
+# Feet that stand are held where they are: the ground plays no part.
+_ANY_TREAD = 1.0
 Standing = tuple[bool, bool]
 
 
@@ -55,7 +57,7 @@ def replay_interval(
 ) -> FloatArray:
     """Return the state (12,) at the end of an interval when its torques act on a state at its start."""
     rate = _rate_function(_standing(trajectory, index))
-    parameters = ((spring.stiffness, spring.equilibrium), walker.vector())
+    parameters = ((spring.stiffness, spring.equilibrium), walker.vector(_ANY_TREAD))
     length = float(trajectory.lengths[index])
 
     def derivative(time: float, current: FloatArray) -> FloatArray:

@@ -3,6 +3,7 @@
 import math
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -60,11 +61,11 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return {str(name): value for name, value in content.items()}
 
 
-def settings_from_entries(kind: type[Settings], entries: dict[str, Any], source: Path) -> Settings:
-    """Return a dataclass of settings whose own refusals name the file that the entries come from.
+def settings_from_entries(kind: Callable[..., Settings], entries: dict[str, Any], source: Path) -> Settings:
+    """Return what `kind` makes of the entries of a file; its own refusals then name the file.
 
     Raises:
-        ConfigurationError: the dataclass refuses an entry.
+        ConfigurationError: it refuses an entry.
     """
     try:
         return kind(**entries)

@@ -125,7 +125,7 @@ class Search:
         if self.session.stopped:
             return start
         parts = (relaxed.points[rows] for rows in (layout.Q, layout.P, layout.REACTION))
-        schedule = schedule_of(self.walker, *parts)
+        schedule = schedule_of(self.walker, self.request.step_length, *parts)
         found = self._with_schedule(replace(relaxed, contacts="found"), schedule, "polish", barrier=_NEAR)
         return found if found.solved and found.mean_effort < best.mean_effort * (1 - SAME_OPTIMUM) else start
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from model.pinocchio_walker import PinocchioWalker
 from model.states import COORDINATES, SPRINGS, VELOCITIES, WALKERS, patient, relative_error
 
-from walk_optimizer.contact.complementarity import net_force
+from walk_optimizer.contact.feet import net_force
 from walk_optimizer.model import dynamics
 from walk_optimizer.model.functions import evaluate, mass_matrices
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
@@ -23,7 +23,7 @@ def momentum_rate():
     walker = SymbolicWalker()
     q, qdot, u = ca.SX.sym("q", 6), ca.SX.sym("qdot", 6), ca.SX.sym("u", 3)
     reaction, spring = ca.SX.sym("reaction", 6), ca.SX.sym("spring", 2)
-    rate = dynamics.momentum_rate(walker, q, qdot, u, net_force(reaction), spring)
+    rate = dynamics.momentum_rate(walker, q, qdot, u, net_force(walker, reaction), spring)
     return ca.Function("momentum_rate", [q, qdot, u, reaction, spring, walker.symbols], [rate])
 
 

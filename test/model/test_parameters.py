@@ -6,10 +6,16 @@ from dataclasses import fields, replace
 import pytest
 
 from walk_optimizer.errors import ConfigurationError, InvalidRequestError
-from walk_optimizer.model.parameters import DYNAMIC_PARAMETERS, SpringMode, WalkerParameters
+from walk_optimizer.model.parameters import (
+    DYNAMIC_PARAMETERS,
+    GROUND_PARAMETERS,
+    SpringMode,
+    WalkerParameters,
+)
 from walk_optimizer.model.symbolic import SymbolicWalker
+from walk_optimizer.model.terrain import Terrain
 
-FIELDS = [field.name for field in fields(WalkerParameters)]
+FIELDS = [field.name for field in fields(WalkerParameters) if field.name != "terrain"]
 
 
 @pytest.mark.parametrize("name", FIELDS)
@@ -59,8 +65,11 @@ def test_the_walker_of_the_report():
 def test_numbers_and_symbols_stand_in_the_same_order():
     walker = WalkerParameters(hip_mass=1, upper_leg_mass=2, lower_leg_mass=3, gravity=6, upper_leg_length=4)
     names = [str(symbol) for symbol in SymbolicWalker().symbols.elements()]
-    assert names == list(DYNAMIC_PARAMETERS)
-    assert walker.vector() == [getattr(walker, name) for name in names]
+    assert names == [*DYNAMIC_PARAMETERS, *GROUND_PARAMETERS]
+    dynamic = [getattr(walker, name) for name in DYNAMIC_PARAMETERS]
+    assert walker.vector() == [*dynamic, 0.0, 0.0, 1.0]
+    inclined = replace(walker, terrain=Terrain(0.1, 0.03))
+    assert inclined.vector(0.25) == [*dynamic, 0.1, 0.03, 0.25]
 
 
 def yaml_file(folder, text):

@@ -6,6 +6,7 @@ import pytest
 from walk_optimizer.guess import GuessShape, kinematic_guess
 from walk_optimizer.model.functions import evaluate
 from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.transcription import layout
 
@@ -21,6 +22,20 @@ def test_feet_are_where_their_paths_are(thigh, shank, shape):
     phase = np.arange(1, 41) / 40
     np.testing.assert_allclose(feet[:, 1, 1], shape.clearance * np.sin(np.pi * phase) ** 2, atol=1e-5)
     assert feet[-1, 0, 1] == pytest.approx(request.step_length, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "terrain", [Terrain(0.1, 0.0), Terrain(-0.1, 0.0), Terrain(0.0, 0.04), Terrain(0.05, -0.03)]
+)
+def test_on_a_slope_or_stairs_the_swing_foot_lands_on_the_ground(terrain):
+    walker = WalkerParameters(terrain=terrain)
+    request = GaitRequest.for_speed(0.42, "none", 40)
+    q = kinematic_guess(walker, request, GuessShape())[layout.Q]
+    feet = evaluate("feet", walker, q, np.zeros_like(q))
+    np.testing.assert_allclose(feet[:, :, 0], 0.0, atol=1e-5)
+    length = request.step_length
+    rise = length * np.tan(terrain.slope) + terrain.step_up
+    np.testing.assert_allclose(feet[-1, :, 1], [length, rise], atol=1e-5)
 
 
 def test_a_step_of_two_stretched_legs_has_a_finite_guess():

@@ -8,11 +8,14 @@ import pytest
 from transcription.plain_program import dense, plain_program, random_scaled_point
 
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
+from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.transcription.problems import complementarity_problem
 
-# Unequal segments and legs of other than 1 m, so that no factor of one hides a mistake.
-WALKER = WalkerParameters(upper_leg_length=0.55, lower_leg_length=0.35, hip_mass=30.0)
+# Unequal segments, legs of other than 1 m and stairs on a slope, so that no factor of one hides a mistake.
+WALKER = WalkerParameters(
+    upper_leg_length=0.55, lower_leg_length=0.35, hip_mass=30.0, terrain=Terrain(0.2, 0.07)
+)
 
 
 @pytest.fixture(scope="session")

@@ -34,8 +34,15 @@ def hamiltonian(walker, q, p, spring):
     return ca.dot(p, qdot) / 2 + potential, qdot
 
 
-def point_rows(walker, interval):
+def ground_height(terrain, tread, x):
+    stairs = terrain.step_up * (x / tread - ca.sin(2 * ca.pi * x / tread) / (2 * ca.pi))
+    return x * np.tan(terrain.slope) + stairs
+
+
+def point_rows(walker, request):
     """(point, state before, spring) -> 12 dynamics, 8 sides a, 8 products a b, in SI units."""
+    tangent = ca.DM([np.cos(walker.terrain.slope), np.sin(walker.terrain.slope)])
+    across = ca.DM([-np.sin(walker.terrain.slope), np.cos(walker.terrain.slope)])
     point, before, spring = ca.SX.sym("point", POINT), ca.SX.sym("before", 12), ca.SX.sym("spring", 2)
     q, p, u, reaction, gamma = ca.vertsplit(point, [0, 6, 12, 15, 21, 23])
     energy, qdot = hamiltonian(walker, q, p, spring)
@@ -45,15 +52,16 @@ def point_rows(walker, interval):
         foot = leg_points(walker, q, leg)[2]
         jacobian = ca.jacobian(foot, q)
         forward, backward, normal = ca.vertsplit(reaction[3 * leg : 3 * leg + 3])
-        pdot += ca.mtimes(jacobian.T, ca.vertcat(forward - backward, normal))
-        slip = ca.mtimes(jacobian[0, :], qdot)
+        pdot += ca.mtimes(jacobian.T, (forward - backward) * tangent + normal * across)
+        slip = ca.dot(tangent, ca.mtimes(jacobian, qdot))
+        above = foot[1] - ground_height(walker.terrain, request.step_length, foot[0])
         sides += [
-            (foot[1], normal),
+            (above * np.cos(walker.terrain.slope), normal),
             (walker.friction_coefficient * normal - forward - backward, gamma[leg]),
             (gamma[leg] + slip, forward),
             (gamma[leg] - slip, backward),
         ]
-    defects = point[:12] - before - interval * ca.vertcat(qdot, pdot)
+    defects = point[:12] - before - request.interval * ca.vertcat(qdot, pdot)
     rows = ca.vertcat(defects, *(a for a, _ in sides), *(a * b for a, b in sides))
     return ca.Function("point_rows", [point, before, spring], [rows])
 
@@ -63,13 +71,14 @@ def plain_program(request, walker):
     x = ca.MX.sym("x", POINT * request.points + 2)
     units, spring_unit = ca.DM(point_units(walker)), ca.DM(spring_units(walker))
     points = ca.horzcat(*(x[POINT * i : POINT * (i + 1)] * units for i in range(request.points)))
-    rows, spring = point_rows(walker, request.interval), x[-2:] * spring_unit
+    rows, spring = point_rows(walker, request), x[-2:] * spring_unit
     last = points[:, -1]
     foot = ca.MX.sym("q", 6)
     landing = ca.Function("landing", [foot], [leg_points(walker, foot, 1)[2][0]])(last[:6])
     relabelled = [0, 1, 4, 5, 2, 3]
     before = ca.vertcat(last[relabelled], last[[6 + row for row in relabelled]])
     before[0] -= landing
+    before[1] -= ground_height(walker.terrain, request.step_length, landing)
     g = []
     for i in range(request.points):
         g.append(rows(points[:, i], before, spring) / ca.DM(row_units(walker)))

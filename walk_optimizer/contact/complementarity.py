@@ -1,53 +1,47 @@
-"""The complementarity pairs of feet and ground, report eq. (5)."""
+"""The complementarity pairs of any point that may touch a surface with friction, report eq. (5)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import casadi as ca
 
-from walk_optimizer.model.dynamics import foot_jacobian
-from walk_optimizer.model.kinematics import foot_position
-from walk_optimizer.model.symbolic import SymbolicWalker
-
-PAIRS_PER_FOOT = 4
+PAIRS_PER_POINT = 4
 
 
-def net_force(reaction: ca.SX) -> ca.SX:
-    """Return the ground reaction (2, 2): rows x and y in [N], one column a foot.
+@dataclass(frozen=True)
+class ContactPoint:
+    """A point that may touch a surface, as expressions of a model's variables.
 
-    Args:
-        reaction: lambda, (6,): x+, x-, y of foot 1, then of foot 2.
+    Attributes:
+        gap: Its distance from the surface in [m].
+        tangential_velocity: Its velocity along the surface, relative to it, in [m/s].
+        forward: Friction force on it along the positive tangent in [N], at least 0.
+        backward: Friction force on it along the negative tangent in [N], at least 0.
+        normal: Force on it away from the surface in [N], at least 0.
+        slip_speed: The slack gamma of its slip speed in [m/s], at least 0.
+        friction: Coulomb coefficient mu [-].
     """
-    return ca.horzcat(
-        *(ca.vertcat(reaction[3 * j] - reaction[3 * j + 1], reaction[3 * j + 2]) for j in range(2))
-    )
+
+    gap: ca.SX
+    tangential_velocity: ca.SX
+    forward: ca.SX
+    backward: ca.SX
+    normal: ca.SX
+    slip_speed: ca.SX
+    friction: ca.SX
+
+    def pairs(self) -> tuple[ca.SX, ca.SX]:
+        """Return both sides (4,) and (4,) of 0 <= a, 0 <= b, a b = 0, eqs. (5a) to (5d)."""
+        a = ca.vertcat(
+            self.gap,
+            self.friction * self.normal - self.forward - self.backward,
+            self.slip_speed + self.tangential_velocity,
+            self.slip_speed - self.tangential_velocity,
+        )
+        return a, ca.vertcat(self.normal, self.slip_speed, self.forward, self.backward)
 
 
-def foot_pairs(
-    walker: SymbolicWalker, q: ca.SX, qdot: ca.SX, reaction: ca.SX, slip_speed: ca.SX, leg: int
-) -> tuple[ca.SX, ca.SX]:
-    """Return both sides (4,) and (4,) of 0 <= a, 0 <= b, a b = 0, eqs. (5a) to (5d) of one foot.
-
-    Args:
-        walker: The walker.
-        q: Coordinates, (6,).
-        qdot: Velocities, (6,).
-        reaction: lambda, (6,), in [N].
-        slip_speed: gamma, (2,), in [m/s].
-        leg: 0 or 1.
-    """
-    forward, backward, normal = (reaction[3 * leg + k] for k in range(3))
-    gamma = slip_speed[leg]
-    tangential_velocity = ca.mtimes(foot_jacobian(walker, q, leg)[0, :], qdot)
-    a = ca.vertcat(
-        foot_position(walker, q, leg)[1],
-        walker.friction_coefficient * normal - forward - backward,
-        gamma + tangential_velocity,
-        gamma - tangential_velocity,
-    )
-    return a, ca.vertcat(normal, gamma, forward, backward)
-
-
-def contact_pairs(
-    walker: SymbolicWalker, q: ca.SX, qdot: ca.SX, reaction: ca.SX, slip_speed: ca.SX
-) -> tuple[ca.SX, ca.SX]:
-    """Return both sides, (8,) each, of the pairs of foot 1, then of foot 2."""
-    feet = [foot_pairs(walker, q, qdot, reaction, slip_speed, leg) for leg in range(2)]
-    return ca.vertcat(feet[0][0], feet[1][0]), ca.vertcat(feet[0][1], feet[1][1])
+def pairs_of(points: Sequence[ContactPoint]) -> tuple[ca.SX, ca.SX]:
+    """Return both sides of the pairs of all points, (4,) of each, one point after the other."""
+    a, b = zip(*(point.pairs() for point in points), strict=True)
+    return ca.vertcat(*a), ca.vertcat(*b)

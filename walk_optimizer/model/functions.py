@@ -12,6 +12,9 @@ from walk_optimizer.model.symbolic import SymbolicWalker
 
 FloatArray = NDArray[np.float64]
 
+# No quantity of the model depends on the ground.
+_ANY_TREAD = 1.0
+
 
 @cache
 def model_function(name: str) -> ca.Function:
@@ -45,6 +48,8 @@ def evaluate(
 ) -> FloatArray:
     """Return a quantity of the model at each of N states.
 
+    None of them depends on the ground, so neither does the result.
+
     Args:
         name: As for `model_function`.
         walker: The walker.
@@ -57,7 +62,8 @@ def evaluate(
     """
     function, count = model_function(name), q.shape[1]
     rows, columns = function.size_out(0)
-    values = function.map(count)(q, p, np.tile(walker.vector(), (count, 1)).T, np.tile(spring, (count, 1)).T)
+    parameters = np.tile(walker.vector(_ANY_TREAD), (count, 1)).T
+    values = function.map(count)(q, p, parameters, np.tile(spring, (count, 1)).T)
     stacked: FloatArray = np.asarray(values).reshape(rows, count, columns).transpose(1, 0, 2)
     return stacked[:, :, 0] if columns == 1 else stacked
 

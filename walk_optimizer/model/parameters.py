@@ -3,12 +3,13 @@
 import hashlib
 import json
 import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
 from walk_optimizer.errors import ConfigurationError, InvalidRequestError
+from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.resources import config_file, read_yaml, settings_from_entries, text_hint
 
 
@@ -56,6 +57,8 @@ DYNAMIC_PARAMETERS = (
     "gravity",
     "friction_coefficient",
 )
+# What contact depends on besides: the terrain, and the length of its treads, which is that of the step.
+GROUND_PARAMETERS = ("slope", "step_up", "tread")
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,7 @@ class WalkerParameters:
         friction_coefficient: Coulomb friction mu of foot and ground [-].
         hip_angle_limit: Upper legs stay within plus and minus this angle in [rad].
         stiffness_limit: Largest knee stiffness K in [N m/rad].
+        terrain: The ground that it walks on.
     """
 
     hip_mass: float = 45.0
@@ -83,11 +87,18 @@ class WalkerParameters:
     friction_coefficient: float = 0.8
     hip_angle_limit: float = math.pi / 2
     stiffness_limit: float = 2000.0
+    terrain: Terrain = field(default_factory=Terrain)
 
     def __post_init__(self) -> None:
         """Refuse values that no walker can have."""
-        for field in fields(self):
-            object.__setattr__(self, field.name, _positive(field.name, getattr(self, field.name)))
+        for entry in fields(self):
+            if entry.name != "terrain":
+                object.__setattr__(self, entry.name, _positive(entry.name, getattr(self, entry.name)))
+        if abs(self.terrain.step_up) >= self.leg_length:
+            raise ConfigurationError(
+                f"terrain step_up is {self.terrain.step_up} m, allowed is less than the leg's "
+                f"{self.leg_length} m, up or down"
+            )
         if self.hip_angle_limit > math.pi:
             raise ConfigurationError(
                 f"walker parameter hip_angle_limit is {self.hip_angle_limit} rad, allowed is up to pi"
@@ -102,14 +113,21 @@ class WalkerParameters:
         """
         source = path or config_file("walker.yaml")
         entries = read_yaml(source)
-        known = {field.name for field in fields(cls)}
+        known = {entry.name for entry in fields(cls)}
         unknown = sorted(set(entries) - known)
         if unknown:
             raise ConfigurationError(
                 f"{source}: unknown walker parameter {', '.join(unknown)}; "
                 f"known are {', '.join(sorted(known))}"
             )
-        return settings_from_entries(cls, entries, source)
+        return settings_from_entries(cls._from_entries, entries, source)
+
+    @classmethod
+    def _from_entries(cls, **entries: Any) -> "WalkerParameters":
+        """Return the walker of the entries of a file."""
+        if "terrain" in entries:
+            entries["terrain"] = Terrain.from_entries(entries["terrain"])
+        return cls(**entries)
 
     @property
     def leg_length(self) -> float:
@@ -131,13 +149,27 @@ class WalkerParameters:
         """Weight of the whole walker in [N]."""
         return self.total_mass * self.gravity
 
-    def vector(self) -> list[float]:
-        """Return the values that the dynamics depend on, in the order of `SymbolicWalker.symbols`."""
-        return [getattr(self, name) for name in DYNAMIC_PARAMETERS]
+    def vector(self, tread: float | None = None) -> list[float]:
+        """Return the values that dynamics and contact depend on, in the order of `SymbolicWalker.symbols`.
+
+        Args:
+            tread: Length of a step in [m], and so of a tread; without stairs it plays no part.
+
+        Raises:
+            ConfigurationError: there are stairs, and no length of their treads was given.
+        """
+        if tread is None and self.terrain.step_up:
+            raise ConfigurationError("stairs need the length of a step: call vector() with it")
+        dynamic = [getattr(self, name) for name in DYNAMIC_PARAMETERS]
+        return [*dynamic, self.terrain.slope, self.terrain.step_up, tread or 1.0]
 
     def fingerprint(self) -> str:
         """Return a short hash of all parameters: equal walkers have equal fingerprints."""
-        text = json.dumps(asdict(self), sort_keys=True)
+        entries = asdict(self)
+        if self.terrain.is_flat:
+            # As it was before walkers had a terrain: gaits on level ground keep their names.
+            del entries["terrain"]
+        text = json.dumps(entries, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -2,11 +2,11 @@
 
 import casadi as ca
 
-from walk_optimizer.model.parameters import DYNAMIC_PARAMETERS
+from walk_optimizer.model.parameters import DYNAMIC_PARAMETERS, GROUND_PARAMETERS
 
 
 class SymbolicWalker:
-    """The dynamic parameters of a walker as CasADi symbols, under the names of `WalkerParameters`.
+    """The parameters of a walker and of its ground as CasADi symbols, under the names they have there.
 
     Attributes:
         symbols: All of them in one column, in the order of `WalkerParameters.vector`.
@@ -19,12 +19,16 @@ class SymbolicWalker:
     lower_leg_length: ca.SX
     gravity: ca.SX
     friction_coefficient: ca.SX
+    slope: ca.SX
+    step_up: ca.SX
+    tread: ca.SX
 
     def __init__(self) -> None:
         """Create the symbols."""
-        for name in DYNAMIC_PARAMETERS:
+        names = DYNAMIC_PARAMETERS + GROUND_PARAMETERS
+        for name in names:
             setattr(self, name, ca.SX.sym(name))
-        self.symbols: ca.SX = ca.vertcat(*(getattr(self, name) for name in DYNAMIC_PARAMETERS))
+        self.symbols: ca.SX = ca.vertcat(*(getattr(self, name) for name in names))
 
     @property
     def leg_length(self) -> ca.SX:

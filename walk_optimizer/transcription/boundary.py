@@ -4,7 +4,8 @@ from functools import cache
 
 import casadi as ca
 
-from walk_optimizer.model.kinematics import RELABELLED, foot_position
+from walk_optimizer.model.ground import ground_height
+from walk_optimizer.model.kinematics import HIP_X, HIP_Y, RELABELLED, foot_position
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.transcription import layout
 from walk_optimizer.transcription.compilation import compiled
@@ -37,9 +38,9 @@ def end_functions(name: str, z: ca.SX, par: ca.SX, rows: ca.SX) -> list[ca.Funct
 def periodic_functions() -> list[ca.Function]:
     """Return the functions that join the last state of a step to its first.
 
-    The legs change names and the hip moves back by the step length, the place where foot 2 lands, so
-    that the stance foot of the next step stands at the origin. That pins the walker's place. The one
-    further row is the step length.
+    The legs change names and the hip moves back by the step length, the place where foot 2 lands, and
+    by the height of the ground there, so that the stance foot of the next step stands at the origin.
+    That pins the walker's place. The one further row is the step length.
     """
     walker, z = SymbolicWalker(), ca.SX.sym("z", layout.STATE_WIDTH)
     units = ca.vertcat(*point_units(walker)[: layout.STATE_WIDTH])
@@ -47,7 +48,8 @@ def periodic_functions() -> list[ca.Function]:
     q, p = physical[layout.Q], physical[layout.P]
     step_length = foot_position(walker, q, 1)[0]
     relabelled = q[list(RELABELLED)]
-    relabelled[0] -= step_length
+    relabelled[HIP_X] -= step_length
+    relabelled[HIP_Y] -= ground_height(walker, step_length)
     state = ca.vertcat(relabelled, p[list(RELABELLED)]) / units
     rows = ca.vertcat(state, step_length / walker.leg_length)
     return end_functions("periodic", z, walker.symbols, rows)

@@ -5,7 +5,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
-from walk_optimizer.contact.complementarity import contact_pairs, net_force
+from walk_optimizer.contact.feet import contact_pairs, net_force
 from walk_optimizer.model import dynamics
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.transcription import layout
@@ -25,7 +25,7 @@ def physical_rows() -> ca.Function:
     spring, interval = ca.SX.sym("spring", 2), ca.SX.sym("h")
     point = layout.Point.of(column)
     qdot = dynamics.velocity(walker, point.q, point.p)
-    force = net_force(point.reaction)
+    force = net_force(walker, point.reaction)
     pdot = dynamics.momentum_rate(walker, point.q, qdot, point.u, force, spring)
     state = ca.vertcat(point.q, point.p)
     a, b = contact_pairs(walker, point.q, qdot, point.reaction, point.slip_speed)

@@ -77,6 +77,12 @@ def spring_bounds(mode: SpringMode, walker: WalkerParameters) -> tuple[KneeSprin
     return KneeSpring(equilibrium=0.0), KneeSpring(stiffness=walker.stiffness_limit)
 
 
+def step_length_bounds(request: GaitRequest, walker: WalkerParameters) -> tuple[float, float]:
+    """Return the bounds of the step length in leg lengths: on stairs a step is as long as a tread."""
+    shortest = request.step_length / walker.leg_length
+    return shortest, shortest if walker.terrain.step_up else np.inf
+
+
 class _Bounds:
     """Bounds under construction: points (23, N) and rows (28, N); a row without bounds is left out."""
 
@@ -93,14 +99,14 @@ class _Bounds:
         low, high = spring_bounds(self.request.spring_mode, self.walker)
         kept = rows.ravel(order="F")
         intervals = np.full(self.request.points, self.request.interval)
-        step_length = self.request.step_length / self.walker.leg_length
+        shortest, longest = step_length_bounds(self.request, self.walker)
         return Problem(
             nlp=_assembled(rows.tobytes(), self.request.points),
-            parameters=np.concatenate([self.walker.vector(), intervals]),
+            parameters=np.concatenate([self.walker.vector(self.request.step_length), intervals]),
             lower_x=to_scaled(self.walker, self.lower, low),
             upper_x=to_scaled(self.walker, self.upper, high),
-            lower_g=np.append(self.lower_rows.ravel(order="F")[kept], step_length),
-            upper_g=np.append(self.upper_rows.ravel(order="F")[kept], np.inf),
+            lower_g=np.append(self.lower_rows.ravel(order="F")[kept], shortest),
+            upper_g=np.append(self.upper_rows.ravel(order="F")[kept], longest),
         )
 
 

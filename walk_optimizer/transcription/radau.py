@@ -10,7 +10,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
-from walk_optimizer.model import dynamics
+from walk_optimizer.model import dynamics, ground
 from walk_optimizer.model.kinematics import foot_position
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.transcription.compilation import compiled
@@ -44,12 +44,13 @@ def contact_rows(walker: SymbolicWalker, q: ca.SX, qdot: ca.SX, force: ca.SX) ->
         force: Ground reaction or impulse, (4,): x, y of foot 1, then of foot 2.
     """
     feet = [foot_position(walker, q, leg) for leg in range(2)]
-    velocities = [ca.jtimes(foot, q, qdot) for foot in feet]
+    velocities = [ground.along_and_normal(walker, ca.jtimes(foot, q, qdot)) for foot in feet]
     cones = []
     for leg in range(2):
-        tangential, normal = force[2 * leg], walker.friction_coefficient * force[2 * leg + 1]
-        cones += [normal - tangential, normal + tangential]
-    gaps = [foot[1] for foot in feet]
+        tangential, normal = ground.along_and_normal(walker, force[2 * leg : 2 * leg + 2])
+        limit = walker.friction_coefficient * normal
+        cones += [limit - tangential, limit + tangential]
+    gaps = [ground.gap(walker, foot) for foot in feet]
     return ca.vertcat(*gaps, *(v[0] for v in velocities), *(v[1] for v in velocities), *cones)
 
 

@@ -14,7 +14,7 @@ from walk_optimizer.transcription.layout import STATE_WIDTH
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
 from walk_optimizer.transcription.phase_bounds import PhaseLayout, kept_rows, stage_bounds
 from walk_optimizer.transcription.phases import Landing
-from walk_optimizer.transcription.problems import spring_bounds
+from walk_optimizer.transcription.problems import spring_bounds, step_length_bounds
 from walk_optimizer.transcription.program import Nlp, Problem
 from walk_optimizer.transcription.refined_variables import SPRING_VARIABLES, RefinedVariables
 from walk_optimizer.transcription.scaling import point_units
@@ -42,14 +42,15 @@ class RefinedProblem:
         layout = self.mesh.layout
         rows = chain_bounds(layout, _landing(layout))
         lower, upper = self.variables.bounds(spring_bounds(self.request.spring_mode, self.walker))
-        step_length = self.request.step_length / self.walker.leg_length
+        vector = self.walker.vector(self.request.step_length)
+        shortest, longest = step_length_bounds(self.request, self.walker)
         return Problem(
             nlp=_assembled(layout),
-            parameters=np.concatenate([self.walker.vector(), self.variables.own_numbers()]),
+            parameters=np.concatenate([vector, self.variables.own_numbers()]),
             lower_x=lower,
             upper_x=upper,
-            lower_g=np.concatenate([rows[0], [step_length, self.request.step_time]]),
-            upper_g=np.concatenate([rows[1], [np.inf, self.request.step_time]]),
+            lower_g=np.concatenate([rows[0], [shortest, self.request.step_time]]),
+            upper_g=np.concatenate([rows[1], [longest, self.request.step_time]]),
         )
 
     def pack(self, points: RefinedPoints) -> FloatArray:
@@ -59,15 +60,22 @@ class RefinedProblem:
     def unpack(self, x: FloatArray) -> RefinedPoints:
         """Return the values of the scaled vector of all variables."""
         last = x[self.variables.last_state_columns()] * self.variables.state_unit
-        return self.variables.unpack(x, state_before_step(self.walker, last))
+        return self.variables.unpack(x, state_before_step(self.walker, self.request.step_length, last))
 
 
-def state_before_step(walker: WalkerParameters, state: FloatArray) -> FloatArray:
-    """Return the state (12,) before the next step's impact: legs relabelled, hip back by the step length."""
+def state_before_step(walker: WalkerParameters, step_length: float, state: FloatArray) -> FloatArray:
+    """Return the state (12,) before the next step's impact: legs relabelled, hip back by the step.
+
+    Args:
+        walker: The walker.
+        step_length: Of the request, in [m].
+        state: At the end of the step, (12,).
+    """
     function = periodic_ends().functions["periodic_value"]
     units = np.array(point_units(walker)[:STATE_WIDTH], dtype=float)
-    before: FloatArray = np.asarray(function(state / units, walker.vector())).ravel()[:STATE_WIDTH] * units
-    return before
+    before = np.asarray(function(state / units, walker.vector(step_length))).ravel()[:STATE_WIDTH]
+    scaled: FloatArray = before * units
+    return scaled
 
 
 def _landing(layout: PhaseLayout) -> Landing:
