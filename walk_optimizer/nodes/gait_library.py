@@ -170,13 +170,13 @@ class GaitLibraryNode(ManagedNode):
         return Finding(Level.OK, f"{len(entries)} gaits", values)
 
     def _optimizer_finding(self) -> Finding:
-        service = self._optimizer.service_name
-        if self._optimizer.service_is_ready():
-            return Finding(Level.OK, "the optimizer is there", {"service": service})
+        values = {"service": self._optimizer.name}
+        if self._optimizer.available:
+            return Finding(Level.OK, "the optimizer is there", values)
         return Finding(
             Level.WARN,
             "the optimizer is not there: only gaits of the library can be had; start gait_optimizer",
-            {"service": service},
+            values,
         )
 
 

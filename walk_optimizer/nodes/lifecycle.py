@@ -24,13 +24,13 @@ import traceback
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from rclpy.client import Client
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.lifecycle.node import LifecycleNodeMixin
 
 from walk_optimizer.errors import WalkOptimizerError
 from walk_optimizer.nodes.diagnostics import Finding, Level
 from walk_optimizer.nodes.parameters import Setting
+from walk_optimizer.nodes.remote_service import RemoteService
 from walk_optimizer.nodes.suite_node import Answer, SuiteNode
 
 AUTOSTART = Setting(
@@ -112,10 +112,10 @@ class ManagedNode(LifecycleNodeMixin, SuiteNode):
 
         super().serve(kind, name, answer_if_active)
 
-    async def call(self, client: Client, request: Any, timeout: float) -> Any:
+    async def call(self, service: RemoteService, request: Any, timeout: float) -> Any:
         """Return the response of another node, while this one is active."""
         self._require_active()
-        return await super().call(client, request, timeout)
+        return await super().call(service, request, timeout)
 
     def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Configure, or leave no trace."""

@@ -62,6 +62,7 @@ def _spin(node: SuiteNode, stop: threading.Event) -> None:
     executor.add_node(node)
     try:
         node.begin()
+        node.announce()
         while not stop.is_set():
             _spin_once(node, executor)
     finally:

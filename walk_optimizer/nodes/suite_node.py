@@ -6,7 +6,6 @@ from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.client import Client
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
@@ -16,6 +15,7 @@ from walk_optimizer.nodes.diagnostics import Diagnostics
 from walk_optimizer.nodes.diagnostics_publisher import DiagnosticsPublisher
 from walk_optimizer.nodes.parameters import NodeParameters, Setting
 from walk_optimizer.nodes.qos import SERVICE
+from walk_optimizer.nodes.remote_service import RemoteService, announce_life
 
 # How often a wait looks whether the other node still lives, in [s].
 _WATCH_PERIOD = 0.1
@@ -52,6 +52,10 @@ class SuiteNode(Node):
             WalkOptimizerError: the node can't start.
         """
 
+    def announce(self) -> None:
+        """Let others know that the node lives; called once its services are there."""
+        announce_life(self)
+
     def close(self) -> None:
         """Give back what the node holds beside ROS entities; called before it is destroyed."""
 
@@ -79,9 +83,9 @@ class SuiteNode(Node):
 
         self.create_service(kind, name, callback, qos_profile=SERVICE, callback_group=self.group)
 
-    def connect(self, kind: type, name: str) -> Client:
-        """Return a client of a service of another node."""
-        return self.create_client(kind, name, qos_profile=SERVICE, callback_group=self.group)
+    def connect(self, kind: type, name: str) -> RemoteService:
+        """Return a service of another node, for `call`."""
+        return RemoteService(self, kind, name, self.group)
 
     def later(self, function: Callable[..., Any], *arguments: Any) -> None:
         """Have a function or coroutine run by the executor; may be called from any thread."""
@@ -109,27 +113,27 @@ class SuiteNode(Node):
         finally:
             self.destroy_timer(timer)
 
-    async def call(self, client: Client, request: Any, timeout: float) -> Any:
+    async def call(self, service: RemoteService, request: Any, timeout: float) -> Any:
         """Return the response of another node.
 
         Args:
-            client: Of the service.
+            service: Of the other node.
             request: To send.
             timeout: Longest wait for the response in [s].
 
         Raises:
             ServiceUnavailableError: nobody offers the service, or it went away, or gave no answer.
         """
-        if not await self._offered(client):
-            raise ServiceUnavailableError(f"service {client.service_name} is not there; is its node running?")
-        future = client.call_async(request)
+        if not await self._offered(service):
+            raise ServiceUnavailableError(f"service {service.name} is not there; is its node running?")
+        future = service.client.call_async(request)
         begin = self._wall.now()
 
         def watch() -> None:
-            if not client.service_is_ready():
-                future.set_exception(_unavailable(client, "went away"))
+            if not service.available:
+                future.set_exception(_unavailable(service, "went away"))
             elif (self._wall.now() - begin).nanoseconds * 1e-9 > timeout:
-                future.set_exception(_unavailable(client, f"gave no answer within {timeout:g} s"))
+                future.set_exception(_unavailable(service, f"gave no answer within {timeout:g} s"))
 
         timer = self.create_timer(_WATCH_PERIOD, watch, self.group, self._wall)
         try:
@@ -145,14 +149,14 @@ class SuiteNode(Node):
         finally:
             self._waits.discard(future)
 
-    async def _offered(self, client: Client, patience: float = 3.0) -> bool:
+    async def _offered(self, service: RemoteService, patience: float = 3.0) -> bool:
         """Return whether a service is there, after giving discovery some time in [s]."""
         for _ in range(round(patience / _WATCH_PERIOD)):
-            if client.service_is_ready():
+            if service.available:
                 return True
             await self.sleep(_WATCH_PERIOD)
-        return client.service_is_ready()
+        return service.available
 
 
-def _unavailable(client: Client, what: str) -> ServiceUnavailableError:
-    return ServiceUnavailableError(f"service {client.service_name} {what}; ask again")
+def _unavailable(service: RemoteService, what: str) -> ServiceUnavailableError:
+    return ServiceUnavailableError(f"service {service.name} {what}; ask again")

@@ -1,0 +1,74 @@
+"""A service of another node, and whether that node lives.
+
+ROS takes a killed process for alive until the lease of its discovery is over, 20 s by default. So each
+node of the suite has a topic `~/alive`, with one latched message that tells of its start. The
+liveliness of the topic is asserted by the middleware, not by Python, and lapses `LEASE` after the
+process is gone.
+"""
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.client import Client
+from rclpy.duration import Duration
+from rclpy.event_handler import QoSLivelinessChangedInfo, SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
+from std_msgs.msg import Empty
+
+from walk_optimizer.nodes.qos import SERVICE
+
+# In [s]; much longer than a busy machine keeps the middleware's thread waiting.
+LEASE = 3.0
+_ALIVE = QoSProfile(
+    depth=1,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    liveliness=LivelinessPolicy.AUTOMATIC,
+    liveliness_lease_duration=Duration(seconds=LEASE),
+)
+
+
+def announce_life(node: Node) -> None:
+    """Offer `~/alive`, once the node's services are there."""
+    node.create_publisher(Empty, "~/alive", _ALIVE).publish(Empty())
+
+
+class RemoteService:
+    """A client that knows whether it is worth to wait."""
+
+    def __init__(self, node: Node, kind: type, name: str, group: CallbackGroup) -> None:
+        """Look for a service and for the life of its node.
+
+        Args:
+            node: That asks.
+            kind: Service type.
+            name: Of the service, which is `~/something` of a node of the suite.
+            group: Callback group of the client.
+        """
+        self.client: Client = node.create_client(kind, name, qos_profile=SERVICE, callback_group=group)
+        self._lost = False
+        folder = self.name.rpartition("/")[0]
+        node.create_subscription(
+            Empty,
+            f"{folder}/alive",
+            self._on_start,
+            _ALIVE,
+            callback_group=group,
+            event_callbacks=SubscriptionEventCallbacks(liveliness=self._on_liveliness),
+        )
+
+    @property
+    def name(self) -> str:
+        """Full name of the service."""
+        return str(self.client.service_name)
+
+    @property
+    def available(self) -> bool:
+        """Whether a node offers the service that is not known to be dead."""
+        return bool(self.client.service_is_ready()) and not self._lost
+
+    def _on_start(self, _message: Empty) -> None:
+        """Note a node that has just started: its first assertion of liveliness takes seconds."""
+        self._lost = False
+
+    def _on_liveliness(self, change: QoSLivelinessChangedInfo) -> None:
+        """Note whether anybody lives; a node without the topic is never heard of, and counts as alive."""
+        self._lost = change.alive_count == 0
