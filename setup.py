@@ -81,7 +81,10 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/walk_optimizer"]),
         (SHARE, ["package.xml"]),
         (f"{SHARE}/config", files("config")),
+        (f"{SHARE}/foxglove", files("foxglove")),
         (f"{SHARE}/launch", files("launch")),
+        (f"{SHARE}/rviz", files("rviz")),
+        (f"{SHARE}/security", files("security")),
         (f"{SHARE}/urdf", files("urdf")),
     ],
     zip_safe=False,
@@ -110,6 +113,7 @@ setup(
             "gait_optimizer = walk_optimizer.nodes.gait_optimizer:main",
             "gait_library = walk_optimizer.nodes.gait_library:main",
             "reference_publisher = walk_optimizer.nodes.reference_publisher:main",
+            "walker_visualizer = walk_optimizer.nodes.walker_visualizer:main",
         ],
     },
 )

@@ -1,7 +1,7 @@
 """Where the walker's frames are, from its joint positions and its base."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from walk_optimizer.description.skeleton import BASE, Joint, Skeleton
@@ -24,17 +24,18 @@ class FrameTransform:
     rotation: tuple[float, float, float, float]
 
 
-def base_transform(fixed_frame: str, base: Sequence[float]) -> FrameTransform:
+def base_transform(fixed_frame: str, base: Iterable[float]) -> FrameTransform:
     """Return the floating base, which moves in a plane and does not turn.
 
     Args:
         fixed_frame: Name of the frame that the ground is in.
         base: Hip position in the optimiser's plane, (x, y) in [m]; its y is up.
     """
-    return FrameTransform(fixed_frame, BASE, (float(base[0]), 0.0, float(base[1])), _turned_forward(0.0))
+    x, y = map(float, base)
+    return FrameTransform(fixed_frame, BASE, (x, 0.0, y), _turned_forward(0.0))
 
 
-def link_transforms(skeleton: Skeleton, position: Sequence[float]) -> list[FrameTransform]:
+def link_transforms(skeleton: Skeleton, position: Iterable[float]) -> list[FrameTransform]:
     """Return the transform of every joint.
 
     Args:
@@ -42,7 +43,7 @@ def link_transforms(skeleton: Skeleton, position: Sequence[float]) -> list[Frame
         position: Of the revolute joints in their order, in [rad].
     """
     angles = iter(position)
-    return [_joint_transform(joint, angles.__next__() if joint.limits else 0.0) for joint in skeleton.joints]
+    return [_joint_transform(joint, next(angles) if joint.limits else 0.0) for joint in skeleton.joints]
 
 
 def _joint_transform(joint: Joint, position: float) -> FrameTransform:

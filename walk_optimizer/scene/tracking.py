@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from walk_optimizer.mechanics import foot_arm
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.scene.gait import Place, ShownGait
+from walk_optimizer.scene.ground import ground_height
 
 FloatArray = NDArray[np.float64]
 
@@ -87,12 +88,15 @@ class WalkTracker:
 
     def _standing(self, reach: FloatArray) -> int:
         """Return the side that stands when no gait tells."""
-        height = reach[:, 1] - reach[:, 1].min()
-        if height.max() > _HEIGHT_TOLERANCE or self._pose is None:
-            return int(np.argmax(-height))
+        if self._pose is None:
+            return int(np.argmin(reach[:, 1]))
+        stance = self._pose.stance
+        feet = self._foot + reach - reach[stance]
+        height = feet[:, 1] - ground_height(self._walker, self._gait, feet[:, 0])
+        if abs(height[1] - height[0]) > _HEIGHT_TOLERANCE:
+            return int(np.argmin(height))
         # Of two feet on the ground the one that moves forward over it is not the one that stands.
         forward = reach[:, 0] - (self._pose.feet - self._pose.base)[:, 0]
-        stance = self._pose.stance
         return 1 - stance if forward[1 - stance] < forward[stance] else stance
 
     def _stand_on(self, stance: int, place: Place | None, reach: FloatArray) -> None:
@@ -103,8 +107,9 @@ class WalkTracker:
         if self._gait is not None and place is not None and before.place is not None:
             self._foot = self._foot + _steps_between(before.place, place) * self._gait.stride
         elif stance != before.stance:
-            # Both feet are on the ground now: the one before is still where it was.
-            self._foot = self._foot + reach[stance] - reach[before.stance]
+            # Both feet are on the ground now, and the one before is still where it was.
+            x = self._foot[0] + reach[stance, 0] - reach[before.stance, 0]
+            self._foot = np.array([x, ground_height(self._walker, self._gait, x)])
 
 
 def _steps_between(before: Place, after: Place) -> int:

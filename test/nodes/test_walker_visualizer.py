@@ -1,0 +1,251 @@
+"""What the visualizer publishes is the walk: an independent library finds the feet where the gait is."""
+
+import functools
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+pytest.importorskip("tf2_msgs")
+
+import pinocchio as pin
+from builtin_interfaces.msg import Time
+from nodes.graph import assert_left_cleanly
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy
+from rosbags.typesys import Stores, get_typestore
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
+from urdf.described_walker import DescribedWalker
+from visualization_msgs.msg import Marker, MarkerArray
+from walk_optimizer_interfaces.msg import Gait as GaitMessage
+
+from walk_optimizer.library import GaitLibrary
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.nodes.conversions import gait_to_message
+from walk_optimizer.nodes.qos import LATCHED, STREAM
+from walk_optimizer.profile import profile_of
+from walk_optimizer.recording.definitions import type_hash
+from walk_optimizer.references import JOINTS, cycle_reference
+
+pytestmark = pytest.mark.ros
+
+NODE = "walker_visualizer"
+LINKS = {
+    "pelvis",
+    *(f"{side}_{part}" for side in ("left", "right") for part in ("upper_leg", "lower_leg", "foot")),
+}
+
+
+@functools.cache
+def packaged_gait():
+    gait, _ = GaitLibrary(WalkerParameters()).find(0.32, "stiffness_and_equilibrium", "nearest")
+    return gait
+
+
+def stamp_of(nanoseconds):
+    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+
+
+def nanoseconds_of(stamp):
+    return stamp.sec * 10**9 + stamp.nanosec
+
+
+class Walk:
+    """A publisher of references, of this test: it says what it walks, and when."""
+
+    def __init__(self, graph, namespace=""):
+        prefix = f"/{namespace}/" if namespace else ""
+        self.graph, self.profile = graph, profile_of(packaged_gait())
+        self.references = {}
+        self.gaits = graph.publisher(GaitMessage, f"{prefix}reference_publisher/gait", LATCHED)
+        self.joints = graph.publisher(JointState, f"{prefix}reference_publisher/joint_reference", STREAM)
+        self.transforms = graph.subscribe(TFMessage, f"{prefix}tf")
+        self.markers = graph.subscribe(MarkerArray, f"{prefix}{NODE}/markers")
+        graph.spin_for(0.5)
+
+    def announce(self):
+        self.gaits.publish(gait_to_message(packaged_gait()))
+        self.graph.spin_for(0.5)
+
+    def send(self, time, order=(0, 1, 2, 3)):
+        """Publish the reference of a time in [s], and wait for the picture."""
+        cycles, rest = divmod(time, 2 * self.profile.step_time)
+        reference = cycle_reference(self.profile, rest)
+        stamp = round(time * 1e9) + 10**12
+        message = JointState(
+            name=[JOINTS[place] for place in order], position=[float(reference.position[i]) for i in order]
+        )
+        message.header.stamp = stamp_of(stamp)
+        self.references[stamp] = reference, reference.base[0] + 2 * cycles * self.profile.step_length
+        before = len(self.markers)
+        self.joints.publish(message)
+        self.graph.spin_until(
+            lambda: len(self.markers) > before and len(self.transforms) >= len(self.markers), "a picture"
+        )
+        return reference
+
+    def picture(self):
+        """Transforms by child, and markers by namespace and number, of the last picture."""
+        transforms = {one.child_frame_id: one for one in self.transforms[-1].transforms}
+        return transforms, {(one.ns, one.id): one for one in self.markers[-1].markers}
+
+
+@pytest.fixture(scope="module")
+def shared(start_for_module):
+    """The namespace of a node that several tests use."""
+    start_for_module(NODE, namespace="shared")
+    return "shared"
+
+
+@pytest.fixture
+def walk(graph, shared):
+    return Walk(graph, shared)
+
+
+def placement(transforms, child):
+    """Where a frame is in the fixed frame, (4, 4), through all its parents."""
+    total = pin.SE3.Identity()
+    while child in transforms:
+        message = transforms[child]
+        t, r = message.transform.translation, message.transform.rotation
+        own = pin.XYZQUATToSE3(np.array([t.x, t.y, t.z, r.x, r.y, r.z, r.w]))
+        total, child = own * total, message.header.frame_id
+    assert child == "odom"
+    return total
+
+
+def test_transforms_are_those_of_the_described_robot_on_the_way(walk, graph):
+    walk.announce()
+    descriptions = graph.subscribe(String, "/shared/robot_description", LATCHED)
+    graph.spin_until(lambda: descriptions, "the description, by a late joiner")
+    robot = DescribedWalker(descriptions[0].data)
+    begin = None
+    for time in np.arange(0.2, 3.0, 0.11):
+        reference = walk.send(float(time))
+        transforms, _ = walk.picture()
+        assert set(transforms) == {"base_link", *LINKS}
+        stamp = nanoseconds_of(transforms["base_link"].header.stamp)
+        assert all(nanoseconds_of(one.header.stamp) == stamp for one in transforms.values())
+        _, way = walk.references[stamp]
+        base = transforms["base_link"].transform.translation
+        begin = base.x - way if begin is None else begin
+        assert (base.x, base.y, base.z) == pytest.approx((begin + way, 0.0, reference.base[1]), abs=1e-4)
+        q = np.array([base.x, base.z, *reference.position])
+        for link in LINKS:
+            difference = placement(transforms, link).homogeneous - robot.placement(link, q)
+            assert np.abs(difference).max() < 1e-9
+
+
+def test_markers_are_paths_reactions_and_ground_of_the_gait(walk):
+    walk.announce()
+    trajectory = packaged_gait().refined.trajectory
+    for time in np.arange(0.1, 2.0, 0.07):
+        reference = walk.send(float(time))
+        transforms, markers = walk.picture()
+        assert all(one.header.frame_id == "odom" for one in markers.values())
+        stance = reference.step % 2
+        arrow, label = markers["ground_reaction", stance], markers["ground_reaction_size", stance]
+        assert markers["ground_reaction", 1 - stance].action == Marker.DELETE
+        force = trajectory.force(*trajectory.locate(reference.time))[:2]
+        tail, tip = (np.array([point.x, point.y, point.z]) for point in arrow.points)
+        foot = placement(transforms, ("left_foot", "right_foot")[stance]).translation
+        assert tail == pytest.approx(foot, abs=1e-6)
+        assert tip - tail == pytest.approx([0.0008 * force[0], 0.0, 0.0008 * force[1]], abs=1e-4)
+        assert float(label.text.removesuffix(" N")) == pytest.approx(np.hypot(*force), abs=1.0)
+        for side, name in enumerate(("left_foot", "right_foot")):
+            ahead = [[point.x, point.z] for point in markers["feet_ahead", side].points]
+            walked = markers["feet_walked", side].points
+            foot = placement(transforms, name).translation
+            assert ahead[0] == pytest.approx([foot[0], foot[2]], abs=1e-4)
+            assert ahead[-1][1] == pytest.approx(0.0, abs=1e-4)
+            if walked:
+                assert [walked[-1].x, walked[-1].y, walked[-1].z] == pytest.approx(foot, abs=1e-6)
+        surface = markers["ground", 0].points
+        base = transforms["base_link"].transform.translation.x
+        assert min(point.x for point in surface) < base - 1 < base + 1 < max(point.x for point in surface)
+        assert {point.z for point in surface} == {0.0}
+
+
+def test_without_a_gait_there_are_links_but_no_forces_and_no_step_ahead(start, graph):
+    start(NODE)
+    walk = Walk(graph)
+    walk.send(0.1)
+    walk.send(0.2)
+    transforms, markers = walk.picture()
+    assert set(transforms) == {"base_link", *LINKS}
+    for namespace in ("ground_reaction", "ground_reaction_size", "feet_ahead"):
+        assert all(markers[namespace, side].action == Marker.DELETE for side in range(2))
+    assert markers["feet_walked", 0].action == Marker.ADD
+
+
+def test_joints_are_matched_by_name_and_a_message_without_them_is_refused(walk):
+    walk.announce()
+    straight = walk.send(0.3)
+    placed = placement(walk.picture()[0], "right_foot").translation
+    walk.send(0.3 + 2 * walk.profile.step_time, order=(2, 0, 3, 1))
+    moved = placement(walk.picture()[0], "right_foot").translation
+    assert moved[2] == pytest.approx(placed[2], abs=1e-6)
+    for message in (
+        JointState(name=["left_hip"], position=[0.1]),
+        JointState(name=list(JOINTS), position=[0.1, float("nan"), 0.1, 3.0]),
+        JointState(name=list(JOINTS), position=[]),
+    ):
+        message.header.stamp = stamp_of(10**13)
+        walk.joints.publish(message)
+    walk.graph.spin_for(0.5)
+    assert walk.send(0.6) is not straight
+
+
+def test_pictures_come_at_the_rate_of_the_parameter_by_the_stamps(walk, graph):
+    walk.send(0.0)
+    (answer,) = graph.set_parameters(f"/shared/{NODE}", Parameter("rate", value=10.0))
+    assert answer.successful
+    message = JointState(name=list(JOINTS), position=[0.1, 3.0, -0.1, 3.0])
+    before = len(walk.markers)
+    for step in range(1, 101):
+        message.header.stamp = stamp_of(10**12 + step * 10**7)
+        walk.joints.publish(message)
+        graph.spin_for(0.01)
+    graph.spin_until(lambda: len(walk.markers) >= before + 10, "ten pictures")
+    graph.spin_for(0.5)
+    assert len(walk.markers) == before + 10
+
+
+def test_links_can_be_left_to_robot_state_publisher(start, graph):
+    node = start(NODE, link_transforms=False, fixed_frame="map")
+    walk = Walk(graph)
+    walk.send(0.2)
+    transforms, markers = walk.picture()
+    assert set(transforms) == {"base_link"}
+    assert transforms["base_link"].header.frame_id == "map"
+    assert markers["ground", 0].header.frame_id == "map"
+    assert_left_cleanly(node, node.stop())
+
+
+def test_a_frame_with_a_slash_and_an_unknown_walker_stop_the_start(start):
+    for parameters, text in (
+        ({"fixed_frame": "/odom"}, "fixed_frame"),
+        ({"walker_file": "no.yaml"}, "no.yaml"),
+    ):
+        node = start(NODE, **parameters)
+        assert node.process.wait(60) == 1
+        assert text in node.output()
+
+
+def test_names_are_relative_so_that_several_walkers_share_a_graph(start, graph):
+    start(NODE, namespace="w1")
+    graph.publisher(JointState, "/w1/reference_publisher/joint_reference")
+    graph.spin_until(lambda: (NODE, "/w1") in graph.node.get_node_names_and_namespaces(), "the node")
+    offered = dict(graph.node.get_publisher_names_and_types_by_node(NODE, "/w1"))
+    assert offered["/w1/tf"] == ["tf2_msgs/msg/TFMessage"]
+    assert offered["/w1/robot_description"] == ["std_msgs/msg/String"]
+    assert offered[f"/w1/{NODE}/markers"] == ["visualization_msgs/msg/MarkerArray"]
+    (endpoint,) = graph.node.get_publishers_info_by_topic("/w1/robot_description")
+    assert endpoint.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+
+
+@pytest.mark.parametrize("name", ["tf2_msgs/msg/TFMessage", "visualization_msgs/msg/MarkerArray"])
+def test_message_types_are_those_of_a_distribution(name):
+    assert type_hash(name) == get_typestore(Stores.ROS2_JAZZY).hash_rihs01(name)

@@ -1,0 +1,71 @@
+"""All that there is to show of a walk at one instant."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.scene.gait import ShownGait
+from walk_optimizer.scene.ground import ground_around
+from walk_optimizer.scene.paths import Trail, paths_ahead
+from walk_optimizer.scene.tracking import WalkerPose, WalkTracker
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """The walker on its ground.
+
+    Attributes:
+        pose: Of the walker.
+        walked: Paths of left and right foot behind them, x and y in [m], (2, K) each.
+        ahead: The same for the step ahead; (2, 0) while the references are not those of the gait.
+        reaction: Ground reaction on left and right foot, x and y in [N], (2, 2); one row a foot; zero
+            while the references are not those of the gait.
+        ground: Points of the ground from behind the walker to before it, x and y in [m], (2, G).
+    """
+
+    pose: WalkerPose
+    walked: tuple[FloatArray, FloatArray]
+    ahead: tuple[FloatArray, FloatArray]
+    reaction: FloatArray
+    ground: FloatArray
+
+
+class WalkScene:
+    """Follows a walk from its joint references, and tells what there is to show of it."""
+
+    def __init__(self, walker: WalkerParameters, trail_duration: float) -> None:
+        """Wait for a first reference.
+
+        Args:
+            walker: That walks.
+            trail_duration: How long the paths of the feet are kept, in [s].
+        """
+        self._walker = walker
+        self._tracker = WalkTracker(walker)
+        self._gait: ShownGait | None = None
+        self.trail = Trail(trail_duration)
+
+    def follow(self, gait: ShownGait) -> None:
+        """Take the references for those of a gait from now on."""
+        self._gait = gait
+        self._tracker.follow(gait)
+
+    def move(self, position: FloatArray) -> WalkerPose:
+        """Move the joints to (4,) in [rad], and return where that brings the walker."""
+        return self._tracker.take(position)
+
+    def show(self, time: float, pose: WalkerPose) -> Scene:
+        """Return what there is to show at a time in [s]."""
+        self.trail.add(time, pose)
+        ahead, reaction = (np.zeros((2, 0)), np.zeros((2, 0))), np.zeros((2, 2))
+        if self._gait is not None and pose.place is not None:
+            ahead = paths_ahead(self._gait, pose, pose.place)
+            # The gait knows a standing and a swinging foot.
+            order = [pose.place.stance, 1 - pose.place.stance]
+            reaction[order] = self._gait.reaction(pose.place.time)
+        ground = ground_around(self._walker, self._gait, float(pose.base[0]))
+        return Scene(pose, self.trail.paths(), ahead, reaction, ground)
