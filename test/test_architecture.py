@@ -27,6 +27,7 @@ LAYERS = (
     ("gait_files", "gait_csv"),
     ("library_entries", "library", "verification", "report_table"),
     ("profile", "references", "reference_check", "background"),
+    ("joint_limits", "phase_clock", "walk", "blending", "command_watch", "tick_statistics"),
     ("description", "scene"),
     ("figures", "reproduction"),
     ("recording",),

@@ -55,6 +55,12 @@ def relabelled(q: FloatArray, step_length: float) -> FloatArray:
     return exchanged
 
 
+def join_error(before: StepProfile, after: StepProfile) -> float:
+    """Return how far a step begins from where the one before it ends, at most, in [m] or [rad]."""
+    end = relabelled(before.sample(before.step_time).q, before.step_length)
+    return float(np.max(np.abs(after.sample(0.0).q - end)))
+
+
 class EulerProfile:
     """The interpolation that belongs to the report's grid (report section III, implicit Euler).
 
@@ -161,47 +167,3 @@ def most_accurate(euler: EulerProfile, refined: RefinedGait | None) -> StepProfi
     if refined is None or not refined.certificate.certified:
         return euler
     return RefinedProfile.of(refined)
-
-
-class BlendedProfile:
-    """The first step of a new gait, begun at the coordinates where the former gait ended.
-
-    The difference at the start fades over the step with s(t) = 1 - 10 t^3 + 15 t^4 - 6 t^5 (t from 0 to
-    1), whose first and second derivatives vanish at both ends. So the references never jump. It is a
-    smooth change of references, not an optimised step: its torques are those of the new gait.
-    """
-
-    def __init__(self, profile: StepProfile, start: FloatArray) -> None:
-        """Blend.
-
-        Args:
-            profile: The new gait.
-            start: Coordinates where the step begins, as the new step sees them, (6,).
-        """
-        self._profile = profile
-        self._difference = start - profile.sample(0.0).q
-
-    @property
-    def method(self) -> str:
-        """Name of the method that the new gait was solved with."""
-        return self._profile.method
-
-    @property
-    def step_time(self) -> float:
-        """Duration of the step in [s]."""
-        return self._profile.step_time
-
-    @property
-    def step_length(self) -> float:
-        """Distance that the step covers in [m]."""
-        return self._profile.step_length
-
-    def sample(self, time: float) -> StepSample:
-        """Return the walker at a time in [s] from the start of the step, 0 <= time <= step_time."""
-        target = self._profile.sample(time)
-        s = time / self.step_time
-        fading = 1 - s**3 * (10 - 15 * s + 6 * s**2)
-        rate = -30 * (s * (1 - s)) ** 2 / self.step_time
-        return StepSample(
-            target.q + fading * self._difference, target.qdot + rate * self._difference, target.u
-        )

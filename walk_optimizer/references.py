@@ -1,4 +1,4 @@
-"""From a gait and the time to references of the joints: an endless walk of left and right steps.
+"""From a gait and the time to references of the joints: left and right from leg 1 and leg 2.
 
 Joints are listed in the order of `JOINTS`. The base of the robot is the hip; it does not rotate, so
 
@@ -14,7 +14,6 @@ one after it; the legs exchange roles where a step ends.
 """
 
 import math
-import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,11 +21,13 @@ from numpy.typing import NDArray
 
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.kinematics import HIP_X, HIP_Y, KNEE_1, KNEE_2, UPPER_1, UPPER_2
-from walk_optimizer.profile import BlendedProfile, StepProfile, StepSample, relabelled
+from walk_optimizer.profile import StepProfile, StepSample
 
 FloatArray = NDArray[np.float64]
 
 JOINTS = ("left_hip", "left_knee", "right_hip", "right_knee")
+# The same joints of the other leg.
+EXCHANGED_JOINTS = ("right_hip", "right_knee", "left_hip", "left_knee")
 
 # Rows of q for JOINTS, with left as the stance leg (leg 1) and as the swing leg (leg 2).
 _LEFT_IS_STANCE = np.array([UPPER_1, KNEE_1, UPPER_2, KNEE_2])
@@ -67,7 +68,7 @@ class Reference:
         return self.effort[[0, 1, 3]]
 
 
-def make_reference(sample: StepSample, step: int, time: float, origin: float) -> Reference:
+def make_reference(sample: StepSample, step: int, time: float, origin: float, rate: float = 1.0) -> Reference:
     """Return the reference of a sample.
 
     Args:
@@ -75,73 +76,17 @@ def make_reference(sample: StepSample, step: int, time: float, origin: float) ->
         step: Number of the step.
         time: Since the start of the step in [s].
         origin: Where the step's coordinates begin along the way, in [m].
+        rate: Time of the walk for each time of the clock, in [0, 1]. Velocities scale with it; so do the
+            torques, because those of a walk hold no walker that stands still in the middle of a step.
     """
-    u1, u2, u3 = sample.u.tolist()
+    u1, u2, u3 = (sample.u * rate).tolist()
     left_is_stance = step % 2 == 0
     rows = _LEFT_IS_STANCE if left_is_stance else _LEFT_IS_SWING
     effort = [u1, u2, -u1, u3] if left_is_stance else [-u1, u3, u1, u2]
     base = sample.q[_BASE]
     base[0] += origin
-    return Reference(
-        sample.q[rows], sample.qdot[rows], np.array(effort), base, sample.qdot[_BASE], step, time
-    )
-
-
-class ReferenceGenerator:
-    """The phase clock of a walk: follows a clock that may stall, jump or be reset, never backwards.
-
-    One thread advances; any thread may ask for another gait, which begins at the next step.
-    """
-
-    def __init__(self, profile: StepProfile, longest_gap: float = 0.1) -> None:
-        """Stand at the start of a step.
-
-        Args:
-            profile: The gait to begin with.
-            longest_gap: A clock that moved further than this since the last call, in [s], or not
-                forwards, has jumped: the phase then holds instead of jumping with it.
-        """
-        self.longest_gap = longest_gap
-        self._gait, self._current = profile, profile
-        self._pending: StepProfile | None = None
-        self._lock = threading.Lock()
-        self._clock: float | None = None
-        self._step, self._time, self._origin = 0, 0.0, 0.0
-
-    @property
-    def gait(self) -> StepProfile:
-        """The gait of the running step."""
-        return self._gait
-
-    def change(self, profile: StepProfile) -> None:
-        """Walk with another gait from the next step on; of several, the last one counts."""
-        with self._lock:
-            self._pending = profile
-
-    def advance(self, clock: float) -> Reference:
-        """Move on to a time of the clock in [s] and return the reference there."""
-        elapsed = clock - self._clock if self._clock is not None else 0.0
-        self._clock = clock
-        if 0 < elapsed <= self.longest_gap:
-            self._time += elapsed
-        while self._time >= self._current.step_time:
-            self._next_step()
-        sample = self._current.sample(self._time)
-        return make_reference(sample, self._step, self._time, self._origin)
-
-    def _next_step(self) -> None:
-        ended = self._current
-        self._time -= ended.step_time
-        self._step += 1
-        self._origin += ended.step_length
-        with self._lock:
-            pending, self._pending = self._pending, None
-        if pending is None:
-            self._current = self._gait
-            return
-        # Leaves the former gait where it ends, and joins the new one over a step.
-        end = relabelled(ended.sample(ended.step_time).q, ended.step_length)
-        self._gait, self._current = pending, BlendedProfile(pending, end)
+    qdot = sample.qdot * rate
+    return Reference(sample.q[rows], qdot[rows], np.array(effort), base, qdot[_BASE], step, time)
 
 
 @dataclass(frozen=True, eq=False)

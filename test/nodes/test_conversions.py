@@ -14,7 +14,7 @@ from walk_optimizer_interfaces.msg import Gait, SolverReport
 from walk_optimizer.errors import GaitFileError
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.conversions import gait_from_message, gait_to_message, request_of_message
-from walk_optimizer.nodes.joint_stream import StreamedGait
+from walk_optimizer.nodes.streamed_gait import StreamedGait
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 
 MODE = "stiffness_and_equilibrium"

@@ -9,19 +9,19 @@ pytest.importorskip("rclpy")
 
 from builtin_interfaces.msg import Time
 from nodes.conftest import FAST, SLOW
-from nodes.graph import assert_left_cleanly
+from nodes.graph import SETTLING, assert_left_cleanly
 from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
-from walk_optimizer_interfaces.msg import Gait
+from walk_optimizer_interfaces.msg import Gait, WalkState
 from walk_optimizer_interfaces.srv import GetJointTrajectory, SetGait, StartRecording, StopRecording
 
 from walk_optimizer.errors import InvalidRequestError
-from walk_optimizer.nodes.joint_stream import StreamedGait
 from walk_optimizer.nodes.qos import LATCHED
+from walk_optimizer.nodes.streamed_gait import StreamedGait
 from walk_optimizer.reference_check import CycleMatcher
 from walk_optimizer.references import JOINTS
 from walk_optimizer.request import GaitRequest
@@ -41,9 +41,19 @@ def publisher(start, stocked):
 
 
 def walk(graph, speed=SLOW):
+    """Have a gait walked, and wait until the steps that lead to it are over."""
+    states = graph.subscribe(WalkState, f"{NODE}/state", LATCHED)
     answer = graph.call(SetGait, f"{NODE}/set_gait", speed=speed, spring_mode=MODE)
     assert answer.success, answer.message
     assert ("(radau)" if speed == FAST else "(implicit_euler)") in answer.message
+    wait_for_state(graph, states, "walking", speed)
+
+
+def wait_for_state(graph, states, name, speed=0.0):
+    def there():
+        return states and states[-1].state == name and abs(states[-1].speed - speed) < 1e-6
+
+    graph.spin_until(there, f"{name} at {speed} m/s")
 
 
 def stamp_ns(message):
@@ -66,9 +76,9 @@ def assert_is_gait(matcher, message):
 
 
 def test_the_stream_is_the_gait_and_velocity_its_derivative_across_the_exchange(graph, publisher):
-    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
     gaits = graph.subscribe(Gait, f"{NODE}/gait", LATCHED)
     walk(graph)
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
     # More than a cycle, so both exchanges of the legs are among them.
     graph.spin_until(lambda: joints and stamp_ns(joints[-1]) - stamp_ns(joints[0]) > 2.5e9, "a cycle")
     matcher = matcher_of(gaits[0])
@@ -101,9 +111,9 @@ def test_torques_are_those_of_the_joints_in_the_order_that_the_label_tells(graph
 
 
 def test_another_gait_begins_at_a_step_without_a_jump(graph, publisher):
-    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
     gaits = graph.subscribe(Gait, f"{NODE}/gait", LATCHED)
     walk(graph)
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
     graph.spin_until(lambda: len(joints) > 10, "references")
     walk(graph, FAST)
     graph.spin_until(lambda: len(gaits) == 2, "the other gait")
@@ -119,11 +129,12 @@ def test_another_gait_begins_at_a_step_without_a_jump(graph, publisher):
 
 
 def test_bad_target_speeds_are_logged_and_the_walk_goes_on(graph, publisher):
-    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
     gaits = graph.subscribe(Gait, f"{NODE}/gait", LATCHED)
     walk(graph)
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
     target = graph.publisher(Float64, f"{NODE}/target_speed")
-    for speed in (math.nan, math.inf, -math.inf, 0.0, -0.5, 99.0):
+    graph.spin_for(SETTLING)
+    for speed in (math.nan, math.inf, -math.inf, -0.5, 99.0):
         joints.clear()
         target.publish(Float64(data=speed))
         graph.spin_until(lambda: len(joints) > 5, "the walk going on")
@@ -293,9 +304,14 @@ def test_a_simulated_clock_that_jumps_moves_no_reference(graph, start, stocked):
                 return milliseconds
         raise AssertionError("no references came with the simulated clock")
 
+    states = graph.subscribe(WalkState, f"{NODE}/state", LATCHED)
     clock.publish(Clock(clock=Time(sec=1000)))
-    walk(graph)
-    last = run_from(1_000_000)
+    assert graph.call(SetGait, f"{NODE}/set_gait", speed=SLOW, spring_mode=MODE).success
+    last = 1_000_000
+    while not states or states[-1].state != "walking":
+        last = run_from(last)
+    joints.clear()
+    last = run_from(last)
     graph.spin_for(0.5)
     held = len(joints)
     graph.spin_for(0.5)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from library.made_up_gait import made_up_gait, with_refinement
 
-from walk_optimizer.profile import BlendedProfile, EulerProfile, RefinedProfile, profile_of, relabelled
+from walk_optimizer.profile import EulerProfile, RefinedProfile, profile_of, relabelled
 from walk_optimizer.transcription.tableau import NODES
 
 GAIT = made_up_gait(points=20)
@@ -73,24 +73,6 @@ def test_samples_cannot_be_written_to():
 def test_a_sample_is_cheap():
     # The aim is well below 100 microseconds; a slow machine gets ten times as long.
     assert min(timeit.repeat(lambda: PROFILE.sample(0.3), number=100, repeat=5)) / 100 < 1e-3
-
-
-@patient
-@given(st.lists(st.floats(-0.5, 0.5), min_size=6, max_size=6), TIMES)
-def test_a_blend_leads_from_one_gait_to_the_other(offset, time):
-    start = PROFILE.sample(0.0).q + np.array(offset)
-    blend = BlendedProfile(PROFILE, start)
-    np.testing.assert_allclose(blend.sample(0.0).q, start, atol=1e-12)
-    np.testing.assert_allclose(blend.sample(STEP).q, PROFILE.sample(STEP).q, atol=1e-12)
-    np.testing.assert_allclose(blend.sample(STEP).qdot, PROFILE.sample(STEP).qdot, atol=1e-12)
-
-    def added(at):
-        return blend.sample(at).q - PROFILE.sample(at).q
-
-    a, b = max(time - 1e-5, 0.0), min(time + 1e-5, STEP)
-    slope = (added(b) - added(a)) / (b - a)
-    middle = (a + b) / 2
-    np.testing.assert_allclose(slope, blend.sample(middle).qdot - PROFILE.sample(middle).qdot, atol=1e-6)
 
 
 # ---------------------------------------------------------------- the refined solution

@@ -13,14 +13,15 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from walk_optimizer_interfaces.msg import Gait as GaitMessage
+from walk_optimizer_interfaces.msg import WalkState
 from walk_optimizer_interfaces.srv import OptimizeGait, SetGait, StartRecording, StopRecording
 
 from walk_optimizer.errors import SolveFailedError
 from walk_optimizer.gait import Gait
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.conversions import gait_from_message
-from walk_optimizer.nodes.joint_stream import StreamedGait
 from walk_optimizer.nodes.qos import LATCHED, STREAM
+from walk_optimizer.nodes.streamed_gait import StreamedGait
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
 from walk_optimizer.reference_check import CycleMatcher
 from walk_optimizer.references import JOINTS
@@ -72,10 +73,12 @@ class DemoClient:
         self._node, self._executor, self._alive = node, executor, alive
         self._references: list[JointState] = []
         self._gait: GaitMessage | None = None
+        self._state = ""
         node.create_subscription(
             JointState, "reference_publisher/joint_reference", self._references.append, STREAM
         )
         node.create_subscription(GaitMessage, "reference_publisher/gait", self._take_gait, LATCHED)
+        node.create_subscription(WalkState, "reference_publisher/state", self._take_state, LATCHED)
 
     def optimize(self, request: GaitRequest, walker: WalkerParameters, timeout: float) -> Gait:
         """Return the gait that the optimizer's service answers with."""
@@ -121,7 +124,8 @@ class DemoClient:
 
     def listen(self, seconds: float) -> Reception:
         """Return what arrives in some time in [s], compared with the gait that the publisher announced."""
-        self.wait(lambda: self._gait is not None and bool(self._references), 30.0, "the first reference")
+        # The steps that lead to the gait are not part of it.
+        self.wait(lambda: self._gait is not None and self._state == "walking", 30.0, "the gait")
         self._references.clear()
         self.pause(seconds)
         assert self._gait is not None  # noqa: S101  # waited for above
@@ -129,6 +133,9 @@ class DemoClient:
 
     def _take_gait(self, message: GaitMessage) -> None:
         self._gait = message
+
+    def _take_state(self, message: WalkState) -> None:
+        self._state = message.state
 
     def _call(self, kind: Any, name: str, request: Any, timeout: float = 30.0) -> Any:
         client = self._node.create_client(kind, name)

@@ -32,7 +32,7 @@ class Setting:
     """
 
     name: str
-    default: bool | int | float | str | list[str]
+    default: bool | int | float | str | list[str] | list[float]
     description: str
     low: float | None = None
     high: float | None = None

@@ -1,12 +1,17 @@
 """The parameters of the node `reference_publisher`."""
 
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
 from walk_optimizer.errors import ConfigurationError
+from walk_optimizer.joint_limits import JointLimits, limits_of
 from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.nodes.parameters import NodeParameters, Setting
+from walk_optimizer.nodes.stream_messages import INTERFACES, TORQUES, StreamFormat
+from walk_optimizer.nodes.walker_setting import WALKER_FILE
 from walk_optimizer.recording import Compression, RecorderSettings
+from walk_optimizer.references import JOINTS
 from walk_optimizer.request import GaitRequest
-
-TORQUES = ("u1", "u2", "u3")
 
 
 def _check_speed(speed: float) -> None:
@@ -14,41 +19,93 @@ def _check_speed(speed: float) -> None:
         GaitRequest.for_speed(speed)
 
 
-def _check_torque_order(order: list[str]) -> None:
-    if sorted(order) != sorted(TORQUES):
-        raise ConfigurationError(f"{list(order)} is no order of {', '.join(TORQUES)}")
+def _order_of(names: Sequence[str]) -> Callable[[list[str]], None]:
+    """Return a check that a list holds each of the names once."""
+
+    def check(order: list[str]) -> None:
+        if sorted(order) != sorted(names):
+            raise ConfigurationError(f"{list(order)} is no order of {', '.join(names)}")
+
+    return check
 
 
-def _check_compression(name: str) -> None:
-    allowed = [entry.value for entry in Compression]
-    if name not in allowed:
-        raise ConfigurationError(f"{name!r} is none of {', '.join(allowed)}")
+def _one_of(names: Sequence[str]) -> Callable[[str], None]:
+    """Return a check that a text is one of the names."""
+
+    def check(name: str) -> None:
+        if name not in names:
+            raise ConfigurationError(f"{name!r} is none of {', '.join(names)}")
+
+    return check
 
 
 SETTINGS = [
     Setting("rate", 500.0, "References per second [Hz].", 1.0, 1000.0),
-    Setting("streaming", True, "Whether references are published; the walk stands still while not."),
+    Setting("streaming", True, "Whether references are published; the walk holds while not."),
     Setting(
         "initial_speed",
         0.0,
-        "Walk at this speed from the start; 0 waits for a command [m/s].",
+        "Walk at this speed from the start; 0 stands until a command comes [m/s].",
         check=_check_speed,
     ),
     Setting(
         "spring_mode",
         SpringMode.STIFFNESS_AND_EQUILIBRIUM.value,
-        f"Knee springs of the gaits for ~/target_speed: {', '.join(SpringMode)}.",
+        f"Knee springs of the gaits for ~/target_speed and ~/cmd_vel: {', '.join(SpringMode)}.",
         check=SpringMode.parse,
     ),
+    Setting(
+        "command_timeout",
+        0.5,
+        "A stream of speeds on ~/cmd_vel that is silent for longer than this, by the node's clock, ends in a "
+        "stop, as with any drive controller; 0 never. Speeds of ~/target_speed and ~/set_gait are "
+        "set-points: sent once, they hold until the next command [s].",
+        0.0,
+        3600.0,
+    ),
+    Setting(
+        "pause_time",
+        0.3,
+        "Time in which ~/pause brings the references to rest, and ~/resume back to the walk [s].",
+        0.01,
+        10.0,
+    ),
+    Setting(
+        "joint_torque_limits",
+        [0.0],
+        "Largest torque of each joint, left_hip, left_knee, right_hip, right_knee, or one number for all; "
+        "0 for none. A gait that needs more is refused [N m].",
+        check=limits_of,
+    ),
+    Setting(
+        "joint_speed_limits",
+        [0.0],
+        "Largest speed of each joint, in the same order, or one number for all; 0 for none. A gait that "
+        "needs more is refused [rad/s].",
+        check=limits_of,
+    ),
     Setting("longest_gap", 0.1, "A clock that moves further than this at once has jumped [s].", 0.002, 10.0),
+    Setting(
+        "joint_names",
+        list(JOINTS),
+        "Order of the joints in all messages.",
+        check=_order_of(JOINTS),
+    ),
+    Setting(
+        "command_interface",
+        "position",
+        f"What ~/commands holds for each joint: {', '.join(INTERFACES)}.",
+        check=_one_of(INTERFACES),
+    ),
     Setting(
         "torque_order",
         list(TORQUES),
         "Order of ~/feedforward_torques: u1 hip (on the left, its opposite on the right), u2 left knee, "
         "u3 right knee.",
-        check=_check_torque_order,
+        check=_order_of(TORQUES),
     ),
     Setting("frame_id", "base_link", "Frame in the header of ~/joint_reference."),
+    WALKER_FILE,
     Setting(
         "library_service",
         "gait_library/get_gait",
@@ -60,7 +117,12 @@ SETTINGS = [
     ),
     Setting("record", False, "Whether a bag is being recorded; set it to start and stop."),
     Setting("recording_folder", "", "Folder of new bags; empty for ~/.ros/walk_optimizer."),
-    Setting("recording_compression", "none", "none, zstd or lz4.", check=_check_compression),
+    Setting(
+        "recording_compression",
+        "none",
+        "none, zstd or lz4.",
+        check=_one_of([entry.value for entry in Compression]),
+    ),
     Setting("recording_file_bytes", 0, "A further file is begun at this size; 0 never [byte].", 0, 1 << 62),
     Setting(
         "recording_file_duration", 0.0, "A further file is begun after this time; 0 never [s].", 0.0, 1e9
@@ -83,3 +145,33 @@ def recorder_settings(parameters: NodeParameters) -> RecorderSettings:
         max_file_duration=parameters["recording_file_duration"],
         min_free_bytes=parameters["recording_free_bytes"],
     )
+
+
+FORMAT_SETTINGS = {"joint_names", "torque_order", "command_interface", "frame_id"}
+
+
+def stream_format(parameters: NodeParameters) -> StreamFormat:
+    """Return what the streamed messages look like from now on."""
+    return StreamFormat(
+        joint_names=tuple(parameters["joint_names"]),
+        torque_order=tuple(parameters["torque_order"]),
+        command_interface=parameters["command_interface"],
+        frame_id=parameters["frame_id"],
+    )
+
+
+LIMIT_SETTINGS = {"joint_torque_limits", "joint_speed_limits"}
+
+
+def joint_limits(parameters: NodeParameters, changes: Mapping[str, Any] | None = None) -> JointLimits:
+    """Return what the joints can do.
+
+    Args:
+        parameters: Of the node.
+        changes: Values that count instead of the parameters.
+    """
+    torque, speed = (
+        limits_of((changes or {}).get(name, parameters[name]))
+        for name in ("joint_torque_limits", "joint_speed_limits")
+    )
+    return JointLimits(torque, speed)

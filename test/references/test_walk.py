@@ -1,0 +1,181 @@
+"""Whatever is commanded and whatever the clock does: no jump, and no more torque than the gaits have."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from references.paces import FAST, LEG_LENGTH, SLOW, STAND, landing_jump
+
+from walk_optimizer.blending import blended
+from walk_optimizer.joint_limits import JointLimits, peaks_of
+from walk_optimizer.phase_clock import PhaseClock
+from walk_optimizer.references import cycle_reference
+from walk_optimizer.walk import DiscontinuousPlanError, StepPlan, Walk
+
+PACES = (STAND, SLOW, FAST)
+PLANS = {(a, b): blended(a, b, LEG_LENGTH) for a in PACES for b in PACES if a is not b}
+STEPS = [*PACES, *(step for plan in PLANS.values() for step in plan.steps)]
+PEAKS = peaks_of(STEPS)
+FASTEST, STRONGEST = max(PEAKS.speed), max(PEAKS.torque)
+LANDING = max(map(landing_jump, (SLOW, FAST)))
+RAMP, GAP = 0.3, 0.1
+
+
+def steepest():
+    """Largest acceleration of a joint within the steps, and while a pause comes or goes, in [rad/s^2]."""
+    largest = 0.0
+    for step in STEPS:
+        times = np.linspace(0, min(step.step_time, 2.0), 2000)
+        rates = np.array([step.sample(time).qdot[2:] for time in times])
+        largest = max(largest, np.abs(np.diff(rates, axis=0)).max() / (times[1] - times[0]))
+    return largest + FASTEST * 1.5 / RAMP
+
+
+STEEPEST = steepest()
+
+COMMANDS = ["slow", "fast", "stand", "pause", "resume", "resume", "emergency"]
+EVENTS = st.lists(
+    st.tuples(
+        st.one_of(st.floats(1e-4, 0.05), st.sampled_from([0.0, -3.0, 5.0, 1e6])),
+        st.one_of(st.none(), st.none(), st.sampled_from(COMMANDS)),
+    ),
+    min_size=20,
+    max_size=120,
+)
+
+
+def go(walk, goal):
+    if goal is walk.pace:
+        walk.stay()
+    else:
+        assert walk.follow(PLANS[walk.pace, goal])
+
+
+def command(walk, name):
+    if name in ("slow", "fast", "stand"):
+        go(walk, {"slow": SLOW, "fast": FAST, "stand": STAND}[name])
+    else:
+        {"pause": walk.clock.pause, "resume": walk.clock.resume, "emergency": walk.clock.stop_at_once}[name]()
+
+
+@settings(deadline=None, max_examples=80)
+@given(EVENTS)
+def test_references_are_continuous_and_bounded_whatever_is_commanded(events):
+    walk, clock = Walk(STAND, PhaseClock(GAP, RAMP)), 0.0
+    before = walk.advance(clock)
+    for tick, name in events:
+        if name is not None:
+            command(walk, name)
+        clock += tick
+        after = walk.advance(clock)
+        passed = tick if 0 < tick <= GAP else 0.0
+        assert np.abs(after.position - before.position).max() <= FASTEST * passed * 1.01 + 1e-9
+        assert np.abs(after.effort).max() <= STRONGEST * (1 + 1e-9)
+        assert np.abs(after.velocity).max() <= FASTEST * 1.01
+        if name != "emergency":
+            allowed = STEEPEST * passed * 1.1 + 1e-6 + LANDING * (after.step - before.step)
+            assert np.abs(after.velocity - before.velocity).max() <= allowed
+        else:
+            assert not after.velocity.any()
+            assert not after.effort.any()
+        before = after
+
+
+@settings(deadline=None, max_examples=30)
+@given(EVENTS)
+def test_velocity_is_the_derivative_of_position(events):
+    walk, clock, period = Walk(STAND, PhaseClock(GAP, RAMP)), 0.0, 5e-3
+    before = walk.advance(clock)
+    for _, name in events:
+        if name is not None:
+            command(walk, name)
+        halted = name == "emergency"
+        for _ in range(10):
+            clock += period
+            after = walk.advance(clock)
+            moved = (before.velocity + after.velocity) / 2 * period
+            error = np.abs(after.position - before.position - moved).max()
+            jump = LANDING * (after.step - before.step) + (FASTEST if halted else 0.0)
+            assert error <= (STEEPEST * period + jump) * period
+            before, halted = after, False
+
+
+def run(walk, begin, seconds, period=1e-3):
+    """Return the references of some time."""
+    times = begin + np.arange(1, round(seconds / period) + 1) * period
+    return [walk.advance(time) for time in times.tolist()]
+
+
+def test_a_stand_is_left_at_once_and_a_gait_at_the_end_of_its_step():
+    walk = Walk(STAND, PhaseClock())
+    standing = run(walk, 0.0, 0.5)
+    np.testing.assert_allclose(standing[-1].position, [0, np.pi, 0, np.pi])
+    assert not np.any([reference.velocity for reference in standing])
+    go(walk, SLOW)
+    assert walk.goal is SLOW
+    (first,) = run(walk, 0.5, 1e-3)
+    assert (first.step, walk.pace, walk.is_changing) == (1, SLOW, True)
+    run(walk, 0.501, SLOW.step_time)
+    assert not walk.is_changing
+    go(walk, STAND)
+    assert walk.pace is SLOW
+    references = run(walk, 0.501 + SLOW.step_time, 2.1 * SLOW.step_time)
+    assert (walk.pace, walk.is_changing, walk.former) == (STAND, False, SLOW)
+    np.testing.assert_allclose(references[-1].position, [0, np.pi, 0, np.pi], atol=1e-12)
+    assert not references[-1].velocity.any()
+
+
+def test_once_it_is_reached_a_gait_is_streamed_as_it_is():
+    walk = Walk(STAND, PhaseClock())
+    walk.advance(0.0)
+    go(walk, FAST)
+    references = run(walk, 0.0, 4 * FAST.step_time)
+    for reference in references[-100:]:
+        # Step 1 leads to the gait, so left is the stance leg of even steps still.
+        expected = cycle_reference(FAST, reference.time + (reference.step % 2) * FAST.step_time)
+        np.testing.assert_allclose(reference.position, expected.position, atol=1e-9)
+        np.testing.assert_allclose(reference.velocity, expected.velocity, atol=1e-9)
+
+
+def test_of_several_plans_the_last_one_counts_and_one_from_elsewhere_is_refused():
+    walk = Walk(SLOW, PhaseClock())
+    assert walk.follow(PLANS[SLOW, FAST])
+    assert walk.follow(PLANS[SLOW, STAND])
+    assert not walk.follow(PLANS[FAST, STAND])
+    run(walk, 0.0, 2.5 * SLOW.step_time)
+    assert walk.pace is STAND
+    walk.follow(PLANS[STAND, FAST])
+    walk.stay()
+    run(walk, 10.0, 0.1)
+    assert walk.pace is STAND
+
+
+def test_a_walk_that_is_held_starts_nothing():
+    walk = Walk(STAND, PhaseClock())
+    walk.advance(0.0)
+    walk.clock.stop_at_once()
+    go(walk, SLOW)
+    assert {reference.step for reference in run(walk, 0.0, 1.0)} == {0}
+    walk.clock.resume()
+    walk.clock.resume()
+    assert run(walk, 1.0, 0.2)[-1].step == 1
+
+
+def test_steps_that_jump_are_no_plan():
+    with pytest.raises(DiscontinuousPlanError, match=r"step 0 of 0 .* ends 0\.\d+ m or rad from where"):
+        StepPlan(SLOW, (), FAST)
+
+
+def test_what_no_joint_can_do_is_refused_with_the_joint_and_both_numbers():
+    peaks = peaks_of([FAST])
+    limits = JointLimits(torque=(100.0, 100.0, 100.0, 1.0), speed=(100.0,) * 4)
+    with pytest.raises(Exception, match=r"right_knee needs \d+(\.\d+)? N m, its limit is 1 N m") as error:
+        limits.require(peaks)
+    assert "left" not in str(error.value)
+    JointLimits().require(peaks)
+    # The legs exchange their roles, so either knee needs what the stance or the swing knee does.
+    assert peaks.torque[:2] == peaks.torque[2:]
+    assert peaks.speed[1] == pytest.approx(
+        max(np.abs([FAST.sample(t).qdot[[3, 5]] for t in np.linspace(0, FAST.step_time, 4000)]).max(axis=0)),
+        rel=1e-3,
+    )

@@ -1,0 +1,97 @@
+"""Steps between paces that blend references: smooth, but solved by nobody, and so without a certificate."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.model.kinematics import HIP_Y, KNEE_1, KNEE_2
+from walk_optimizer.profile import StepProfile, StepSample
+from walk_optimizer.walk import StepPlan
+
+FloatArray = NDArray[np.float64]
+
+
+class Stand:
+    """Both feet below the hip, legs straight, at rest, without torques; it has no end of its own."""
+
+    method = "stand"
+    step_length = 0.0
+
+    def __init__(self, leg_length: float, duration: float = math.inf) -> None:
+        """Stand.
+
+        Args:
+            leg_length: Of a stretched leg in [m].
+            duration: In [s].
+        """
+        q = np.zeros(6)
+        q[HIP_Y], q[[KNEE_1, KNEE_2]] = leg_length, math.pi
+        zero = np.zeros(6)
+        for array in (q, zero):
+            array.setflags(write=False)
+        self._sample = StepSample(q, zero, zero[:3])
+        self.step_time = duration
+
+    def sample(self, time: float) -> StepSample:  # noqa: ARG002  # it is the same at all times
+        """Return the walker at any time."""
+        return self._sample
+
+
+class JoinedStep:
+    """The first step of a new pace, begun at the coordinates and velocities where the former pace is.
+
+    The difference at the start, in position and velocity, fades over the step with the cubic Hermite
+    polynomials h00(s) = 1 - 3 s^2 + 2 s^3 and h10(s) = s - 2 s^2 + s^3, s from 0 to 1: neither jumps.
+    The torques are those of the new pace.
+    """
+
+    def __init__(self, profile: StepProfile, begin: StepSample) -> None:
+        """Join.
+
+        Args:
+            profile: The new pace, or a part of it that ends.
+            begin: Where the step begins, as the new step sees it.
+        """
+        start = profile.sample(0.0)
+        self._profile = profile
+        self._q = begin.q - start.q
+        self._qdot = begin.qdot - start.qdot
+
+    @property
+    def method(self) -> str:
+        """Name of the method that the new pace was solved with."""
+        return self._profile.method
+
+    @property
+    def step_time(self) -> float:
+        """Duration of the step in [s]."""
+        return self._profile.step_time
+
+    @property
+    def step_length(self) -> float:
+        """Distance that the step covers in [m]."""
+        return self._profile.step_length
+
+    def sample(self, time: float) -> StepSample:
+        """Return the walker at a time in [s] from the start of the step, 0 <= time <= step_time."""
+        target = self._profile.sample(time)
+        duration = self.step_time
+        s = time / duration
+        q = (1 - s) ** 2 * ((1 + 2 * s) * self._q + s * duration * self._qdot)
+        qdot = 6 * s * (s - 1) / duration * self._q + (1 - s) * (1 - 3 * s) * self._qdot
+        return StepSample(target.q + q, target.qdot + qdot, target.u)
+
+
+def blended(begins: StepProfile, leads_to: StepProfile, leg_length: float) -> StepPlan:
+    """Return one step that blends a pace into another.
+
+    Args:
+        begins: The pace that is left, at the start of a step of it.
+        leads_to: The pace that follows; a stand is reached after the time of a step of the former pace.
+        leg_length: Of a stretched leg in [m].
+    """
+    begin = begins.sample(0.0)
+    standing = math.isinf(leads_to.step_time)
+    target = Stand(leg_length, begins.step_time) if standing else leads_to
+    return StepPlan(begins, (JoinedStep(target, begin),), leads_to)

@@ -1,0 +1,95 @@
+"""The largest torques and speeds that a robot's joints can do, and what steps need of them."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from walk_optimizer.errors import ConfigurationError, WalkOptimizerError
+from walk_optimizer.profile import StepProfile
+from walk_optimizer.references import EXCHANGED_JOINTS, JOINTS, cycle_reference
+
+# Of a step: so fine that the polynomials of a step peak less than a part in a thousand higher between.
+_SAMPLES = 400
+# What rounding may add.
+_TOLERANCE = 1e-9
+
+
+class JointLimitError(WalkOptimizerError):
+    """Steps that need more of a joint than it can do; the message names the joint and both numbers."""
+
+
+@dataclass(frozen=True)
+class JointPeaks:
+    """The most that steps need of each joint of `JOINTS`, whichever leg begins.
+
+    Attributes:
+        torque: In [N m], (4,).
+        speed: In [rad/s], (4,).
+    """
+
+    torque: tuple[float, ...]
+    speed: tuple[float, ...]
+
+
+def peaks_of(steps: Iterable[StepProfile]) -> JointPeaks:
+    """Return the most that steps need: a joint may be in the stance leg or in the swing leg of each."""
+    torque, speed = np.zeros(len(JOINTS)), np.zeros(len(JOINTS))
+    for step in steps:
+        duration = step.step_time if math.isfinite(step.step_time) else 0.0
+        for time in np.linspace(0.0, duration, _SAMPLES).tolist():
+            reference = cycle_reference(step, time)
+            torque = np.maximum(torque, np.abs(reference.effort))
+            speed = np.maximum(speed, np.abs(reference.velocity))
+    exchanged = [JOINTS.index(name) for name in EXCHANGED_JOINTS]
+    torque, speed = (np.maximum(peaks, peaks[exchanged]) for peaks in (torque, speed))
+    return JointPeaks(tuple(torque.tolist()), tuple(speed.tolist()))
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """What each joint of `JOINTS` can do; infinite where there is no limit.
+
+    Attributes:
+        torque: Largest torque in [N m], (4,).
+        speed: Largest speed in [rad/s], (4,).
+    """
+
+    torque: tuple[float, ...] = (math.inf,) * len(JOINTS)
+    speed: tuple[float, ...] = (math.inf,) * len(JOINTS)
+
+    def require(self, peaks: JointPeaks) -> None:
+        """Refuse steps that need more.
+
+        Raises:
+            JointLimitError: names each joint that can't do them, what they need and what is allowed.
+        """
+        excesses = [
+            f"{joint} needs {needed:.4g} {unit}, its limit is {limit:.4g} {unit}"
+            for need, limits, unit in (
+                (peaks.torque, self.torque, "N m"),
+                (peaks.speed, self.speed, "rad/s"),
+            )
+            for joint, needed, limit in zip(JOINTS, need, limits, strict=True)
+            if needed > limit * (1 + _TOLERANCE)
+        ]
+        if excesses:
+            raise JointLimitError("; ".join(excesses))
+
+
+def limits_of(values: Sequence[float]) -> tuple[float, ...]:
+    """Return a limit for each joint from one number for all of them, or one for each; 0 means none.
+
+    Raises:
+        ConfigurationError: there are neither one nor four, or one is negative or not finite.
+    """
+    if len(values) not in (1, len(JOINTS)):
+        raise ConfigurationError(
+            f"{len(values)} numbers, expected 1 or {len(JOINTS)} (of {', '.join(JOINTS)})"
+        )
+    for value in values:
+        if not (math.isfinite(value) and value >= 0):
+            raise ConfigurationError(f"a limit is {value}, allowed are finite numbers from 0 (no limit)")
+    limits = tuple(value if value > 0 else math.inf for value in values)
+    return limits if len(limits) == len(JOINTS) else limits * len(JOINTS)

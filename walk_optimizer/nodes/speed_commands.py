@@ -1,0 +1,151 @@
+"""Speeds that come as topics: `~/target_speed`, sent once, and `~/cmd_vel`, a stream that must go on."""
+
+import time
+from dataclasses import dataclass
+
+from geometry_msgs.msg import Twist
+from rclpy.clock import Clock
+from std_msgs.msg import Float64
+
+from walk_optimizer.command_watch import CommandWatch
+from walk_optimizer.errors import WalkOptimizerError
+from walk_optimizer.nodes.lifecycle import ManagedNode
+from walk_optimizer.nodes.qos import COMMAND
+from walk_optimizer.nodes.walk_commands import SupersededError, WalkCommands
+from walk_optimizer.request import GaitRequest
+
+# How often it is looked whether a stream of commands has fallen silent, in [s].
+_WATCH_PERIOD = 0.05
+# A speed that was refused is not asked for again within this time, however often it is sent, in [s].
+_REFUSAL_HOLDS = 1.0
+
+
+@dataclass(frozen=True)
+class _Target:
+    """What a speed asks for.
+
+    Attributes:
+        request: Gait to walk; None for a stand.
+    """
+
+    request: GaitRequest | None
+
+
+_STAND = _Target(None)
+
+
+class SpeedCommands:
+    """Follows speeds as they come: of those that come while a gait is fetched, the last one counts.
+
+    A speed that is refused changes nothing, and keeps no stream alive. Speed 0 is a stop.
+    """
+
+    def __init__(self, node: ManagedNode, commands: WalkCommands, wall: Clock) -> None:
+        """Subscribe.
+
+        Args:
+            node: That subscribes.
+            commands: That carry out what is asked for.
+            wall: A clock that also runs while a simulation stands still.
+        """
+        self._node, self._commands = node, commands
+        self.watch = CommandWatch(node.parameters["command_timeout"])
+        self._waiting: _Target | None = None
+        self._current: _Target | None = None
+        self._refused: tuple[_Target, float] | None = None
+        self._following = False
+        for kind, topic, callback in (
+            (Float64, "~/target_speed", self._on_target_speed),
+            (Twist, "~/cmd_vel", self._on_twist),
+        ):
+            node.create_subscription(kind, topic, callback, COMMAND, callback_group=node.group)
+        node.create_timer(_WATCH_PERIOD, self._look, node.group, wall)
+
+    def forget(self) -> None:
+        """Drop what was asked for: another command has come than by these topics."""
+        self._waiting = self._current = None
+        self.watch.end()
+
+    def _on_target_speed(self, message: Float64) -> None:
+        target = self._target(message.data)
+        if target is not None:
+            self.watch.end()
+            self._take(target)
+
+    def _on_twist(self, message: Twist) -> None:
+        target = self._target(message.linear.x)
+        if target is not None:
+            self.watch.heard(self._now())
+            self._take(target)
+
+    def _target(self, speed: float) -> _Target | None:
+        """Return what a speed in [m/s] asks for; None where it is refused."""
+        if not self._node.active:
+            return None
+        if speed == 0:
+            return _STAND
+        try:
+            return _Target(GaitRequest.for_speed(speed, self._node.parameters["spring_mode"]))
+        except WalkOptimizerError as error:
+            self._tell_refusal(error)
+            return None
+
+    def _take(self, target: _Target) -> None:
+        """Follow a target, unless that is done already."""
+        if target == self._current or self._was_just_refused(target):
+            return
+        if target == _STAND:
+            # A stop waits for nothing; what is being fetched then comes too late to count.
+            self._waiting, self._current = None, target
+            self._node.later(self._carry_out, target)
+            return
+        self._waiting = target
+        if not self._following:
+            self._following = True
+            self._node.later(self._follow)
+
+    async def _follow(self) -> None:
+        """Carry out the targets that wait; of those that come meanwhile, the last one counts."""
+        try:
+            while (target := self._waiting) is not None:
+                self._waiting, self._current = None, target
+                await self._carry_out(target)
+        finally:
+            self._following = False
+
+    async def _carry_out(self, target: _Target) -> None:
+        try:
+            if target.request is None:
+                text = await self._commands.stop()
+            else:
+                text = await self._commands.walk_at(target.request)
+        except SupersededError:
+            return
+        except WalkOptimizerError as error:
+            self._tell_refusal(error)
+            self._refused = target, time.monotonic()
+            self._current = None
+            return
+        self._node.get_logger().info(text, throttle_duration_sec=1.0)
+
+    def _was_just_refused(self, target: _Target) -> bool:
+        if self._refused is None:
+            return False
+        refused, when = self._refused
+        return target == refused and time.monotonic() - when < _REFUSAL_HOLDS
+
+    def _tell_refusal(self, error: WalkOptimizerError) -> None:
+        self._node.get_logger().warning(f"target speed refused: {error}", throttle_duration_sec=1.0)
+
+    def _look(self) -> None:
+        """Stop the walk when a stream of speeds has fallen silent."""
+        self.watch.timeout = self._node.parameters["command_timeout"]
+        if self.watch.fell_silent(self._now()):
+            self._node.get_logger().warning(
+                f"no speed on ~/cmd_vel for {self.watch.timeout:g} s: coming to a stand"
+            )
+            self._take(_STAND)
+
+    def _now(self) -> float:
+        """Return the time of the node's clock in [s]."""
+        return self._node.get_clock().now().nanoseconds * 1e-9
