@@ -1,8 +1,10 @@
-"""Start the gait optimiser, the gait library and the reference publisher."""
+"""Start the gait optimiser, the gait library and the reference publisher, and what shows the walk."""
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.condition import Condition
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration, OrSubstitution, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
@@ -10,28 +12,54 @@ from launch_ros.substitutions import FindPackageShare
 NODES = ("gait_optimizer", "gait_library", "reference_publisher")
 
 
-def walker_node(name: str) -> Node:
+def shared_file(*names: str) -> PathJoinSubstitution:
+    """Return the path of a file that ships with the package."""
+    return PathJoinSubstitution([FindPackageShare("walk_optimizer"), *names])
+
+
+def use_sim_time() -> dict[str, ParameterValue]:
+    """Return the parameter that all nodes share."""
+    return {"use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)}
+
+
+def walker_node(name: str, condition: Condition | None = None) -> Node:
     """Return the node `name` with the parameter file of the same name."""
-    use_sim_time = ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)
     return Node(
         package="walk_optimizer",
         executable=name,
         name=name,
         namespace=LaunchConfiguration("namespace"),
-        parameters=[
-            PathJoinSubstitution([FindPackageShare("walk_optimizer"), "config", f"{name}.yaml"]),
-            {"use_sim_time": use_sim_time},
-        ],
+        parameters=[shared_file("config", f"{name}.yaml"), use_sim_time()],
         ros_arguments=["--log-level", LaunchConfiguration("log_level")],
         output="screen",
+        condition=condition,
+    )
+
+
+def rviz_node() -> Node:
+    """Return RViz with everything in place; it sees the transforms of the namespace that it is in."""
+    return Node(
+        package="rviz2",
+        executable="rviz2",
+        name="rviz",
+        namespace=LaunchConfiguration("namespace"),
+        arguments=["-d", shared_file("rviz", "walker.rviz")],
+        parameters=[use_sim_time()],
+        remappings=[("/tf", "tf"), ("/tf_static", "tf_static")],
+        condition=IfCondition(LaunchConfiguration("rviz")),
     )
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the three nodes and the launch arguments they share."""
+    """Return the nodes and the launch arguments they share."""
     arguments = [
         DeclareLaunchArgument("namespace", default_value="", description="Namespace of the nodes."),
         DeclareLaunchArgument("use_sim_time", default_value="false", description="Take time from /clock."),
         DeclareLaunchArgument("log_level", default_value="info", description="debug, info, warn or error."),
+        DeclareLaunchArgument("visualize", default_value="false", description="Also walker_visualizer."),
+        DeclareLaunchArgument("rviz", default_value="false", description="Also walker_visualizer and RViz."),
     ]
-    return LaunchDescription([*arguments, *map(walker_node, NODES)])
+    shown = IfCondition(OrSubstitution(LaunchConfiguration("visualize"), LaunchConfiguration("rviz")))
+    return LaunchDescription(
+        [*arguments, *map(walker_node, NODES), walker_node("walker_visualizer", shown), rviz_node()]
+    )

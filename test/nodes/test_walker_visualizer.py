@@ -1,7 +1,5 @@
 """What the visualizer publishes is the walk: an independent library finds the feet where the gait is."""
 
-import functools
-
 import numpy as np
 import pytest
 
@@ -9,87 +7,26 @@ pytest.importorskip("rclpy")
 pytest.importorskip("tf2_msgs")
 
 import pinocchio as pin
-from builtin_interfaces.msg import Time
 from nodes.graph import assert_left_cleanly
+from nodes.made_up_walk import NODE, Walk, nanoseconds_of, packaged_gait, stamp_of
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from tf2_msgs.msg import TFMessage
 from urdf.described_walker import DescribedWalker
-from visualization_msgs.msg import Marker, MarkerArray
-from walk_optimizer_interfaces.msg import Gait as GaitMessage
+from visualization_msgs.msg import Marker
 
-from walk_optimizer.library import GaitLibrary
-from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.nodes.conversions import gait_to_message
-from walk_optimizer.nodes.qos import LATCHED, STREAM
-from walk_optimizer.profile import profile_of
+from walk_optimizer.nodes.qos import LATCHED
 from walk_optimizer.recording.definitions import type_hash
-from walk_optimizer.references import JOINTS, cycle_reference
+from walk_optimizer.references import JOINTS
 
 pytestmark = pytest.mark.ros
 
-NODE = "walker_visualizer"
 LINKS = {
     "pelvis",
     *(f"{side}_{part}" for side in ("left", "right") for part in ("upper_leg", "lower_leg", "foot")),
 }
-
-
-@functools.cache
-def packaged_gait():
-    gait, _ = GaitLibrary(WalkerParameters()).find(0.32, "stiffness_and_equilibrium", "nearest")
-    return gait
-
-
-def stamp_of(nanoseconds):
-    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
-
-
-def nanoseconds_of(stamp):
-    return stamp.sec * 10**9 + stamp.nanosec
-
-
-class Walk:
-    """A publisher of references, of this test: it says what it walks, and when."""
-
-    def __init__(self, graph, namespace=""):
-        prefix = f"/{namespace}/" if namespace else ""
-        self.graph, self.profile = graph, profile_of(packaged_gait())
-        self.references = {}
-        self.gaits = graph.publisher(GaitMessage, f"{prefix}reference_publisher/gait", LATCHED)
-        self.joints = graph.publisher(JointState, f"{prefix}reference_publisher/joint_reference", STREAM)
-        self.transforms = graph.subscribe(TFMessage, f"{prefix}tf")
-        self.markers = graph.subscribe(MarkerArray, f"{prefix}{NODE}/markers")
-        graph.spin_for(0.5)
-
-    def announce(self):
-        self.gaits.publish(gait_to_message(packaged_gait()))
-        self.graph.spin_for(0.5)
-
-    def send(self, time, order=(0, 1, 2, 3)):
-        """Publish the reference of a time in [s], and wait for the picture."""
-        cycles, rest = divmod(time, 2 * self.profile.step_time)
-        reference = cycle_reference(self.profile, rest)
-        stamp = round(time * 1e9) + 10**12
-        message = JointState(
-            name=[JOINTS[place] for place in order], position=[float(reference.position[i]) for i in order]
-        )
-        message.header.stamp = stamp_of(stamp)
-        self.references[stamp] = reference, reference.base[0] + 2 * cycles * self.profile.step_length
-        before = len(self.markers)
-        self.joints.publish(message)
-        self.graph.spin_until(
-            lambda: len(self.markers) > before and len(self.transforms) >= len(self.markers), "a picture"
-        )
-        return reference
-
-    def picture(self):
-        """Transforms by child, and markers by namespace and number, of the last picture."""
-        transforms = {one.child_frame_id: one for one in self.transforms[-1].transforms}
-        return transforms, {(one.ns, one.id): one for one in self.markers[-1].markers}
 
 
 @pytest.fixture(scope="module")
