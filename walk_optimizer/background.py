@@ -9,7 +9,8 @@ from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import Progress, ProgressCallback, SolveReport, Status
-from walk_optimizer.solve.worker import SolveStoppedError, Ticket, WorkerPool
+from walk_optimizer.solve.worker import WorkerPool
+from walk_optimizer.solve.worker_task import SolveStoppedError, Ticket
 
 
 @dataclass(frozen=True)

@@ -78,6 +78,7 @@ class Graph:
     def action(self, kind, name):
         client = ActionClient(self.node, kind, name)
         self.spin_until(client.server_is_ready, f"action {name}")
+        self.spin_for(SETTLING)
         return client
 
     def set_parameters(self, node, *parameters):

@@ -1,18 +1,23 @@
 import os
 import signal
+import time
 
 import pytest
 
 pytest.importorskip("rclpy")
 
 from action_msgs.msg import GoalStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nodes.graph import assert_left_cleanly, children_of, exists, is_worker
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from walk_optimizer_interfaces.action import OptimizeGait as OptimizeGaitAction
 from walk_optimizer_interfaces.srv import OptimizeGait
 
+from walk_optimizer.background import GaitJob, submit_gait
 from walk_optimizer.errors import InvalidRequestError
-from walk_optimizer.model.parameters import SpringMode
+from walk_optimizer.model.parameters import SpringMode, WalkerParameters
+from walk_optimizer.nodes.gait_optimizer import GaitOptimizerNode
 from walk_optimizer.nodes.qos import SERVICE as SERVICE_QOS
 from walk_optimizer.request import GaitRequest
 
@@ -41,13 +46,17 @@ class Goal:
     """A goal of the action, accepted and running."""
 
     def __init__(self, graph, namespace="", **fields):
-        self._graph, self.feedback = graph, []
+        self._graph, self.feedback, self.on_feedback = graph, [], lambda: None
         client = graph.action(OptimizeGaitAction, namespace + ACTION)
         goal = OptimizeGaitAction.Goal(**fields)
-        sent = client.send_goal_async(goal, lambda message: self.feedback.append(message.feedback))
+        sent = client.send_goal_async(goal, self._hear)
         self.handle = graph.result(sent)
         assert self.handle.accepted
         self._result = self.handle.get_result_async()
+
+    def _hear(self, message):
+        self.feedback.append(message.feedback)
+        self.on_feedback()
 
     def wait_for_progress(self):
         self._graph.spin_until(lambda: self.feedback, "progress")
@@ -108,6 +117,96 @@ def test_the_node_answers_during_a_solve_and_cancel_ends_the_worker(graph, optim
     assert status == GoalStatus.STATUS_CANCELED
     assert (result.success, result.report.status) == (False, "cancelled")
     graph.spin_until(lambda: not set(workers) & set(children_of(optimizer.process.pid)), "the worker's end")
+
+
+@pytest.mark.slow
+def test_service_and_action_give_the_same_result(graph, optimizer):
+    fields = {"speed": 0.9, "spring_mode": "none", "points": 20}
+    answer = graph.call(OptimizeGait, SERVICE, **fields)
+    status, result = Goal(graph, **fields).result()
+    assert status == GoalStatus.STATUS_SUCCEEDED
+    assert (result.success, result.message) == (answer.success, answer.message)
+    assert result.gait == answer.gait
+    answer.report.solve_time = result.report.solve_time
+    assert result.report == answer.report
+
+
+def test_a_goal_hears_of_its_solve_every_second_and_how_much_time_is_left(graph, optimizer):
+    limit = 5.0
+    goal = Goal(graph, **ENDLESS, time_limit=limit)
+    behind = Goal(graph, **ENDLESS | {"points": 1999}, time_limit=limit)
+    behind.wait_for_progress()
+    assert (behind.feedback[0].stage, behind.feedback[0].time_left) == ("queued", limit)
+    arrivals = []
+    goal.on_feedback = lambda: arrivals.append(time.monotonic())
+    status, result = goal.result()
+    assert (status, result.report.status) == (GoalStatus.STATUS_ABORTED, "time_limit")
+    assert "starting" in {one.stage for one in goal.feedback} or goal.feedback[0].elapsed < 1.0
+    assert all(one.time_left == pytest.approx(max(limit - one.elapsed, 0)) for one in goal.feedback)
+    # As a count: one message may be late on a busy machine, but not most of them.
+    assert len(arrivals) >= arrivals[-1] - arrivals[0]
+    graph.result(behind.handle.cancel_goal_async())
+    assert behind.result()[0] == GoalStatus.STATUS_CANCELED
+
+
+def test_timers_of_the_node_keep_their_rate_during_a_solve(graph, isolated_graph):
+    """In one process with the node: the same timer, with and without a solve, in the same run."""
+    node = GaitOptimizerNode()
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    ticks = []
+    node.create_timer(0.01, lambda: ticks.append(1))
+
+    def ticks_in(seconds):
+        ticks.clear()
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            executor.spin_once(timeout_sec=0.01)
+        return len(ticks)
+
+    try:
+        ticks_in(1.0)
+        idle = ticks_in(2.0)
+        job = GaitJob(GaitRequest.for_speed(**ENDLESS), WalkerParameters.from_yaml(), 60.0)
+        ticket = submit_gait(node._pool, job)
+        node.later(node.finished, ticket.future)
+        while ticket.progress.iteration == 0:
+            executor.spin_once(timeout_sec=0.01)
+        assert ticks_in(2.0) > idle / 2
+        ticket.cancel()
+    finally:
+        node.close()
+        executor.shutdown()
+        node.destroy_node()
+
+
+def test_diagnostics_tell_of_workers_queue_and_the_last_outcome(graph, own_optimizer):
+    heard = graph.subscribe(DiagnosticArray, "/diagnostics")
+    name = "own/gait_optimizer"
+
+    def finding(check):
+        statuses = [one for array in heard for one in array.status if one.name == f"{name}: {check}"]
+        return statuses[-1] if statuses else None
+
+    def wait_for(check, words, level):
+        graph.spin_until(lambda: (one := finding(check)) and words in one.message, f"{check}: {words}")
+        assert finding(check).level == level
+        return {pair.key: pair.value for pair in finding(check).values}
+
+    assert wait_for("workers", "waiting for requests", DiagnosticStatus.OK)["workers"] == "1"
+    goal = Goal(graph, "own/", **ENDLESS)
+    goal.wait_for_progress()
+    graph.send(OptimizeGait, f"own/{SERVICE}", **ENDLESS | {"points": 1999})
+    values = wait_for("workers", "solving", DiagnosticStatus.OK)
+    assert (values["running"], values["queue_limit"]) == ("1", "2")
+    graph.send(OptimizeGait, f"own/{SERVICE}", **ENDLESS | {"points": 1998})
+    wait_for("workers", "the queue is full", DiagnosticStatus.WARN)
+    (worker,) = (pid for pid in children_of(own_optimizer.process.pid) if is_worker(pid))
+    os.kill(worker, signal.SIGKILL)
+    values = wait_for("solves", "the worker process ended before it answered", DiagnosticStatus.WARN)
+    assert (values["failed"], values["last_status"]) == ("1", "worker_lost")
+    times = [array.header.stamp.sec for array in heard]
+    assert len(times) >= (times[-1] - times[0]) / 2
 
 
 def test_two_clients_share_a_solve_and_a_killed_worker_is_told_to_both(graph, optimizer):

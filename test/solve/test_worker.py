@@ -12,7 +12,8 @@ from solve.worker_jobs import work
 
 from walk_optimizer.errors import SolveFailedError
 from walk_optimizer.solve.status import Status
-from walk_optimizer.solve.worker import BusyError, SolveStoppedError, WorkerPool
+from walk_optimizer.solve.worker import BusyError, PoolState, WorkerPool
+from walk_optimizer.solve.worker_task import SolveStoppedError
 
 PATIENCE = 120.0
 FOREVER = 1e6
@@ -87,6 +88,21 @@ def test_a_cancelled_report_keeps_the_last_iterate(pool):
     report = ticket.future.exception().report
     assert (report.iterations, report.objective) == (event.iteration, 1.5)
     assert report.message == Status.CANCELLED.sentence
+
+
+def test_a_ticket_tells_where_its_job_stands_also_while_the_solver_is_silent(pool):
+    progress = FirstProgress()
+    running = pool.submit("sleep", FOREVER, progress)
+    waiting = pool.submit("echo", FOREVER)
+    progress.wait()
+    assert pool.state() == PoolState(workers=1, running=1, waiting=1)
+    first, second = running.progress, running.progress
+    assert (first.stage, first.objective) == ("sleeping", 1.5)
+    assert second.elapsed > first.elapsed
+    assert (waiting.progress.stage, waiting.progress.elapsed) == ("queued", 0.0)
+    running.cancel()
+    waiting.future.result(PATIENCE)
+    assert pool.state() == PoolState(workers=1, running=0, waiting=0)
 
 
 def test_what_the_job_has_started_is_killed_too(pool):

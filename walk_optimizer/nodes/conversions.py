@@ -204,14 +204,15 @@ def report_from_message(message: SolverReportMessage) -> SolveReport:
     )
 
 
-def progress_to_message(progress: Progress) -> OptimizeGaitAction.Feedback:
-    """Return progress of a solve as action feedback."""
+def progress_to_message(progress: Progress, time_limit: float) -> OptimizeGaitAction.Feedback:
+    """Return progress of a solve that may last `time_limit` in [s] as action feedback."""
     return OptimizeGaitAction.Feedback(
         stage=progress.stage,
         iteration=progress.iteration,
         objective=float(progress.objective),
         infeasibility=float(progress.infeasibility),
         elapsed=float(progress.elapsed),
+        time_left=max(time_limit - float(progress.elapsed), 0.0),
     )
 
 

@@ -1,8 +1,6 @@
 """A node's diagnostics on `/diagnostics`, once a second, as diagnostic_updater publishes them."""
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.callback_groups import CallbackGroup
-from rclpy.clock import Clock
 from rclpy.node import Node
 
 from walk_optimizer.nodes.diagnostics import Diagnostics, Finding
@@ -11,27 +9,25 @@ from walk_optimizer.nodes.qos import STREAM
 
 # Global, unlike all other topics of the suite: aggregators and monitors listen there.
 TOPIC = "/diagnostics"
+# In [s].
 PERIOD = 1.0
 
 
 class DiagnosticsPublisher:
     """Publishes what a node's checks find."""
 
-    def __init__(self, node: Node, diagnostics: Diagnostics, wall: Clock, group: CallbackGroup) -> None:
-        """Begin to publish.
+    def __init__(self, node: Node, diagnostics: Diagnostics) -> None:
+        """Create the topic.
 
         Args:
             node: Whose diagnostics they are.
             diagnostics: Its checks.
-            wall: A clock that also runs while a simulation stands still.
-            group: Callback group of the timer.
         """
         self._node, self._diagnostics = node, diagnostics
         # As diagnostic_updater names them: `namespace/node: check`.
         self._name = node.get_fully_qualified_name().lstrip("/")
         self._hardware = node.get_namespace().strip("/") or "walker"
         self._publisher = node.create_publisher(DiagnosticArray, TOPIC, STREAM)
-        node.create_timer(PERIOD, self.publish, group, wall)
 
     def publish(self) -> None:
         """Publish what the checks find now."""

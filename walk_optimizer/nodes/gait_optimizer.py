@@ -11,16 +11,20 @@ from walk_optimizer_interfaces.srv import OptimizeGait
 from walk_optimizer.background import GaitJob, outcome_of, solve_job, submit_gait
 from walk_optimizer.errors import InvalidRequestError, SolveFailedError, WalkOptimizerError
 from walk_optimizer.nodes.conversions import gait_to_message, progress_to_message, report_to_message
+from walk_optimizer.nodes.optimizer_health import OptimizerHealth
 from walk_optimizer.nodes.parameters import Setting
 from walk_optimizer.nodes.running import run_node
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.walker_setting import WALKER_FILE, walker_of
 from walk_optimizer.request import GaitRequest, gait_table_settings
 from walk_optimizer.solve.settings import solver_settings
-from walk_optimizer.solve.status import Status
-from walk_optimizer.solve.worker import Ticket, WorkerPool
+from walk_optimizer.solve.status import Progress, Status
+from walk_optimizer.solve.worker import WorkerPool
+from walk_optimizer.solve.worker_task import Ticket
 
 LONGEST_TIME_LIMIT = 86_400.0
+# A client hears of its goal at least this often, also while the solver is silent, in [s].
+_FEEDBACK_PERIOD = 0.5
 
 
 def _settings() -> list[Setting]:
@@ -66,6 +70,10 @@ class GaitOptimizerNode(SuiteNode):
         self._walker = walker_of(self.parameters["walker_file"])
         self._pool = WorkerPool(solve_job, self.parameters["workers"], self.parameters["queue_limit"])
         self._tickets: dict[bytes, Ticket] = {}
+        self._health = OptimizerHealth(
+            self._pool.state, self.parameters["workers"], self.parameters["queue_limit"]
+        )
+        self._health.join(self.diagnostics)
         self.serve(OptimizeGait, "~/optimize_gait", self._answer)
         self._action = ActionServer(
             self,
@@ -107,6 +115,7 @@ class GaitOptimizerNode(SuiteNode):
         """
         await self.finished(ticket.future)
         outcome = outcome_of(ticket.future)
+        self._health.note(outcome.report)
         answer.report = report_to_message(outcome.report)
         if outcome.gait is None:
             raise SolveFailedError(f"{outcome.report.status.value}: {outcome.report.message}")
@@ -115,25 +124,38 @@ class GaitOptimizerNode(SuiteNode):
 
     async def _execute(self, goal: ServerGoalHandle) -> OptimizeGaitAction.Result:
         result = OptimizeGaitAction.Result()
-        key = bytes(goal.goal_id.uuid)
         try:
-            self._tickets[key] = ticket = submit_gait(
-                self._pool,
-                self._job(goal.request),
-                lambda progress: self.later(goal.publish_feedback, progress_to_message(progress)),
-            )
-            if goal.is_cancel_requested:  # Between being accepted and getting here.
-                ticket.cancel()
-            await self._fill(result, ticket)
+            await self._pursue(goal, result)
             result.success = True
             goal.succeed()
         except WalkOptimizerError as error:
             result.message = str(error)
             cancelled = result.report.status == Status.CANCELLED and goal.is_cancel_requested
             goal.canceled() if cancelled else goal.abort()
-        finally:
-            self._tickets.pop(key, None)
         return result
+
+    async def _pursue(self, goal: ServerGoalHandle, result: OptimizeGaitAction.Result) -> None:
+        """Solve for a goal, and tell how far it is: when the solver does, and regularly.
+
+        Raises:
+            WalkOptimizerError: there is no gait.
+        """
+        job = self._job(goal.request)
+
+        def tell(progress: Progress) -> None:
+            goal.publish_feedback(progress_to_message(progress, job.time_limit))
+
+        ticket = submit_gait(self._pool, job, lambda progress: self.later(tell, progress))
+        key = bytes(goal.goal_id.uuid)
+        self._tickets[key] = ticket
+        timer = self.repeat(_FEEDBACK_PERIOD, lambda: tell(ticket.progress))
+        try:
+            if goal.is_cancel_requested:  # Between being accepted and getting here.
+                ticket.cancel()
+            await self._fill(result, ticket)
+        finally:
+            self.destroy_timer(timer)
+            del self._tickets[key]
 
     def _cancel(self, goal: ServerGoalHandle) -> CancelResponse:
         ticket = self._tickets.get(bytes(goal.goal_id.uuid))

@@ -9,10 +9,11 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
+from rclpy.timer import Timer
 
 from walk_optimizer.errors import WalkOptimizerError
 from walk_optimizer.nodes.diagnostics import Diagnostics
-from walk_optimizer.nodes.diagnostics_publisher import DiagnosticsPublisher
+from walk_optimizer.nodes.diagnostics_publisher import PERIOD, DiagnosticsPublisher
 from walk_optimizer.nodes.parameters import NodeParameters, Setting
 from walk_optimizer.nodes.qos import SERVICE
 from walk_optimizer.nodes.remote_service import RemoteService, announce_life
@@ -43,7 +44,7 @@ class SuiteNode(Node):
         self._wall = Clock(clock_type=ClockType.STEADY_TIME)
         self._waits: set[Future] = set()
         self.diagnostics = Diagnostics()
-        DiagnosticsPublisher(self, self.diagnostics, self._wall, self.group)
+        self.repeat(PERIOD, DiagnosticsPublisher(self, self.diagnostics).publish)
 
     def begin(self) -> None:
         """Start what needs an executor; called once, before it spins.
@@ -75,7 +76,7 @@ class SuiteNode(Node):
                 response.success = True
             except WalkOptimizerError as error:
                 response.message = str(error)
-                self.get_logger().info(f"{name} refused: {error}")
+                self.get_logger().debug(f"{name} refused: {error}")
             except Exception as error:  # noqa: BLE001  # the client gets an answer, and the node lives on
                 response.message = f"internal error: {error!r}"
                 self.get_logger().error(f"{name} failed: {traceback.format_exc()}")
@@ -107,11 +108,15 @@ class SuiteNode(Node):
     async def sleep(self, seconds: float) -> None:
         """Wait for some time in [s] of the wall clock."""
         done = Future()
-        timer = self.create_timer(seconds, lambda: done.set_result(None), self.group, self._wall)
+        timer = self.repeat(seconds, lambda: done.set_result(None))
         try:
             await self._wait(done)
         finally:
             self.destroy_timer(timer)
+
+    def repeat(self, seconds: float, function: Callable[[], None]) -> Timer:
+        """Have a function called after every so many [s] of the wall clock, until the timer is destroyed."""
+        return self.create_timer(seconds, function, self.group, self._wall)
 
     async def call(self, service: RemoteService, request: Any, timeout: float) -> Any:
         """Return the response of another node.
@@ -135,7 +140,7 @@ class SuiteNode(Node):
             elif (self._wall.now() - begin).nanoseconds * 1e-9 > timeout:
                 future.set_exception(_unavailable(service, f"gave no answer within {timeout:g} s"))
 
-        timer = self.create_timer(_WATCH_PERIOD, watch, self.group, self._wall)
+        timer = self.repeat(_WATCH_PERIOD, watch)
         try:
             return await self._wait(future)
         finally:

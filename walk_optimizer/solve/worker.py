@@ -6,16 +6,16 @@ hashable value, handed to a module-level function in the process (`worker_proces
 
 import atexit
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Hashable
-from concurrent.futures import Future
+from dataclasses import dataclass
 from typing import Any
 
 from walk_optimizer.errors import SolveFailedError, WalkOptimizerError
-from walk_optimizer.solve.status import Progress, SolveReport, Status
+from walk_optimizer.solve.status import Progress, Status
 from walk_optimizer.solve.worker_handle import WorkerHandle, WorkerLostError, WorkerOverdueError
 from walk_optimizer.solve.worker_process import Failed, Finished, Function
+from walk_optimizer.solve.worker_task import Task, Ticket
 
 # A solve ends itself at its time limit; one that still has not after this time in [s] is killed.
 GRACE = 2.0
@@ -25,59 +25,19 @@ class BusyError(WalkOptimizerError):
     """Too many solves are waiting already."""
 
 
-class SolveStoppedError(SolveFailedError):
-    """The worker process was stopped, or died, before it had an answer.
+@dataclass(frozen=True)
+class PoolState:
+    """What a pool is doing.
 
     Attributes:
-        report: Status, and the statistics of the last iterate that was heard of.
+        workers: Processes that live.
+        running: Jobs that are being done.
+        waiting: Jobs that wait for a process.
     """
 
-    def __init__(self, report: SolveReport) -> None:
-        """Take message and status from the report."""
-        super().__init__(report.message)
-        self.report = report
-
-
-class Ticket:
-    """One client's share of a job.
-
-    Attributes:
-        future: Resolves to the function's result, or to SolveStoppedError or SolveFailedError.
-    """
-
-    def __init__(self, pool: "WorkerPool", on_progress: Callable[[Progress], None] | None) -> None:
-        """Wait for a job of the pool."""
-        self.future: Future[Any] = Future()
-        self.on_progress = on_progress
-        self._pool = pool
-
-    def cancel(self) -> None:
-        """Give the job up at once; its process is killed unless another client waits for it too."""
-        self._pool.give_up(self)
-
-
-class _Task:
-    """A job and everyone who waits for it."""
-
-    def __init__(self, job: Hashable, time_limit: float) -> None:
-        self.job, self.time_limit = job, time_limit
-        self.tickets: list[Ticket] = []
-        self.worker: WorkerHandle | None = None
-        self.begin = time.monotonic()
-        self.progress: Progress | None = None
-
-    def stopped(self, status: Status) -> SolveStoppedError:
-        """Return the error that ends the task with a status."""
-        last = self.progress
-        report = SolveReport(
-            status,
-            status.sentence,
-            back_end="",
-            iterations=last.iteration if last else 0,
-            solve_time=time.monotonic() - self.begin,
-            objective=last.objective if last else float("nan"),
-        )
-        return SolveStoppedError(report)
+    workers: int
+    running: int
+    waiting: int
 
 
 class WorkerPool:
@@ -95,12 +55,13 @@ class WorkerPool:
             grace: How far a job may exceed its time limit before it is killed, in [s].
         """
         self._function, self._queue_limit, self._grace = function, queue_limit, grace
-        self._queue: deque[_Task] = deque()
-        self._tasks: dict[tuple[Hashable, float], _Task] = {}
+        self._queue: deque[Task] = deque()
+        self._tasks: dict[tuple[Hashable, float], Task] = {}
+        self._workers: dict[int, WorkerHandle] = {}
         self._changed = threading.Condition()
         self._closed = False
         self._threads = [
-            threading.Thread(target=self._serve, name=f"solve_worker_{index}", daemon=True)
+            threading.Thread(target=self._serve, args=(index,), name=f"solve_worker_{index}", daemon=True)
             for index in range(workers)
         ]
         # Before multiprocessing's own exit hook, which would wait for the processes for ever.
@@ -121,13 +82,13 @@ class WorkerPool:
         Raises:
             BusyError: the queue is full, or the pool closed.
         """
-        ticket = Ticket(self, on_progress)
         with self._changed:
             if self._closed:
                 raise BusyError("the solver is shutting down; ask again when it runs")
             task = self._tasks.get((job, time_limit))
             if task is None:
                 task = self._enqueue(job, time_limit)
+            ticket = Ticket(task, self.give_up, on_progress)
             task.tickets.append(ticket)
             self._changed.notify()
         return ticket
@@ -143,6 +104,13 @@ class WorkerPool:
                 self._drop(task)
         ticket.future.set_exception(task.stopped(Status.CANCELLED))
 
+    def state(self) -> PoolState:
+        """Return what the pool is doing now."""
+        with self._changed:
+            running = sum(task.worker is not None for task in self._tasks.values())
+            alive = sum(worker.alive for worker in tuple(self._workers.values()))
+            return PoolState(alive, running, len(self._queue))
+
     def close(self) -> None:
         """Cancel everything, end the processes and wait for them; again is harmless."""
         with self._changed:
@@ -155,18 +123,18 @@ class WorkerPool:
             thread.join()
         atexit.unregister(self.close)
 
-    def _enqueue(self, job: Hashable, time_limit: float) -> _Task:
+    def _enqueue(self, job: Hashable, time_limit: float) -> Task:
         if len(self._queue) >= self._queue_limit:
             raise BusyError(
                 f"busy: {len(self._queue)} solves are waiting, no more than {self._queue_limit} may; "
                 "ask again later"
             )
-        task = _Task(job, time_limit)
+        task = Task(job, time_limit)
         self._tasks[job, time_limit] = task
         self._queue.append(task)
         return task
 
-    def _drop(self, task: _Task) -> None:
+    def _drop(self, task: Task) -> None:
         """Forget a task that nobody waits for."""
         del self._tasks[task.job, task.time_limit]
         if task.worker is not None:
@@ -174,31 +142,29 @@ class WorkerPool:
         elif task in self._queue:  # Otherwise a thread has just taken it, and will see that it is off.
             self._queue.remove(task)
 
-    def _serve(self) -> None:
+    def _serve(self, index: int) -> None:
         """Body of a thread: one worker process, renewed whenever it is lost."""
-        worker = WorkerHandle(self._function)
+        worker = self._workers[index] = WorkerHandle(self._function)
         while (task := self._next_task()) is not None:
             if not worker.alive:
                 worker.end()
-                worker = WorkerHandle(self._function)
+                worker = self._workers[index] = WorkerHandle(self._function)
             self._do(task, worker)
         worker.end()
 
-    def _next_task(self) -> _Task | None:
+    def _next_task(self) -> Task | None:
         """Wait for a task; None when the pool is closed."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._queue)
             return None if self._closed else self._queue.popleft()
 
-    def _do(self, task: _Task, worker: WorkerHandle) -> None:
+    def _do(self, task: Task, worker: WorkerHandle) -> None:
         with self._changed:
             if not task.tickets:
                 return
-            task.worker, task.begin = worker, time.monotonic()
+            task.start(worker)
         try:
-            answer = worker.run(
-                task.job, task.time_limit + self._grace, lambda event: self._tell(task, event)
-            )
+            answer = worker.run(task.job, task.time_limit + self._grace, task.tell)
         except WorkerOverdueError:
             self._finish(task, error=task.stopped(Status.TIME_LIMIT))
         except WorkerLostError:
@@ -206,19 +172,13 @@ class WorkerPool:
         else:
             self._answer(task, answer)
 
-    def _answer(self, task: _Task, answer: Finished | Failed) -> None:
+    def _answer(self, task: Task, answer: Finished | Failed) -> None:
         if isinstance(answer, Finished):
             self._finish(task, result=answer.result)
         else:
             self._finish(task, error=SolveFailedError(answer.message))
 
-    def _tell(self, task: _Task, progress: Progress) -> None:
-        task.progress = progress
-        for ticket in tuple(task.tickets):
-            if ticket.on_progress is not None:
-                ticket.on_progress(progress)
-
-    def _finish(self, task: _Task, result: Any = None, error: Exception | None = None) -> None:
+    def _finish(self, task: Task, result: Any = None, error: Exception | None = None) -> None:
         """Answer everyone who still waits."""
         with self._changed:
             tickets, task.tickets = task.tickets, []

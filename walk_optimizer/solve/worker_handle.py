@@ -6,6 +6,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing.connection import wait
 from typing import Any
 
 from walk_optimizer.solve.status import Progress
@@ -34,7 +35,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 class WorkerHandle:
-    """One spawned process; `kill` may be called from any thread, the rest from one."""
+    """One spawned process; `kill` and `alive` may be used from any thread, the rest from one."""
 
     def __init__(self, function: Function) -> None:
         """Start the process; it imports what it needs while this returns."""
@@ -49,8 +50,8 @@ class WorkerHandle:
 
     @property
     def alive(self) -> bool:
-        """Whether the process runs."""
-        return self._process.is_alive()
+        """Whether the process runs; may be asked from any thread."""
+        return not wait([self._process.sentinel], timeout=0)
 
     def run(self, job: Any, time_limit: float, on_progress: Callable[[Progress], None]) -> Finished | Failed:
         """Do a job.
