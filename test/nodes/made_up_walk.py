@@ -54,9 +54,9 @@ class Walk:
         cycles, rest = divmod(time, 2 * self.profile.step_time)
         reference = cycle_reference(self.profile, rest)
         stamp = round(time * 1e9) + 10**12
-        message = JointState(
-            name=[JOINTS[place] for place in order], position=[float(reference.position[i]) for i in order]
-        )
+        message = JointState(name=[JOINTS[place] for place in order])
+        for field in ("position", "effort"):
+            setattr(message, field, [float(getattr(reference, field)[place]) for place in order])
         message.header.stamp = stamp_of(stamp)
         self.references[stamp] = reference, reference.base[0] + 2 * cycles * self.profile.step_length
         before = len(self.markers)

@@ -29,7 +29,6 @@ FOXGLOVE = json.loads((CHECKOUT / "foxglove" / "walker.json").read_text())
 DISPLAYS = {
     "rviz_default_plugins/RobotModel": ("Description Topic", "std_msgs/msg/String"),
     "rviz_default_plugins/MarkerArray": ("Topic", "visualization_msgs/msg/MarkerArray"),
-    "rviz_default_plugins/Effort": ("Topic", "sensor_msgs/msg/JointState"),
     "rviz_default_plugins/TF": (None, "tf2_msgs/msg/TFMessage"),
 }
 
@@ -76,7 +75,6 @@ def test_rviz_displays_take_topics_that_are_published_with_their_type_and_qualit
             assert info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
         assert topic.get("Reliability Policy", "Reliable") == "Reliable"
         assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
-    assert displays["rviz_default_plugins/Effort"]["Robot Description"] == "robot_description"
 
 
 def test_rviz_looks_at_frames_and_namespaces_that_there_are(walk):

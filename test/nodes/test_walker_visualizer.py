@@ -99,6 +99,8 @@ def test_markers_are_paths_reactions_and_ground_of_the_gait(walk):
             assert ahead[-1][1] == pytest.approx(0.0, abs=1e-4)
             if walked:
                 assert [walked[-1].x, walked[-1].y, walked[-1].z] == pytest.approx(foot, abs=1e-6)
+        labels = [markers["joint_torque_sizes", number].text for number in range(4)]
+        assert labels == [f"{round(torque, 1) + 0.0:.1f} N m" for torque in reference.effort]
         surface = markers["ground", 0].points
         base = transforms["base_link"].transform.translation.x
         assert min(point.x for point in surface) < base - 1 < base + 1 < max(point.x for point in surface)

@@ -10,6 +10,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from walk_optimizer.scene.scene import Scene
+from walk_optimizer.scene.torques import TorqueArc
 
 FloatArray = NDArray[np.float64]
 Colour = tuple[float, float, float, float]
@@ -19,11 +20,17 @@ _SIDE_COLOURS: tuple[Colour, Colour] = ((0.12, 0.31, 0.55, 1.0), (0.85, 0.45, 0.
 _FORCE_COLOUR: Colour = (0.80, 0.10, 0.16, 1.0)
 _GROUND_COLOUR: Colour = (0.60, 0.62, 0.65, 1.0)
 _TEXT_COLOUR: Colour = (0.10, 0.10, 0.10, 1.0)
+_TORQUE_COLOUR: Colour = (0.45, 0.10, 0.55, 1.0)
 # Sizes in [m].
 _WALKED_WIDTH, _AHEAD_WIDTH, _TICK_WIDTH = 0.006, 0.012, 0.008
 _SHAFT, _HEAD, _HEAD_LENGTH = 0.02, 0.045, 0.06
 _TEXT_HEIGHT = 0.06
 _GROUND_WIDTH = 0.6
+_TORQUE_WIDTH = 0.012
+# Torques of the left leg are written behind it, those of the right leg ahead.
+_LABEL_AHEAD = (-0.22, 0.22)
+# Arcs lie this much further outside than the legs [-].
+_BESIDE_LEG = 1.3
 # A smaller force is none, [N].
 _LEAST_FORCE = 1.0
 
@@ -56,6 +63,8 @@ class SceneMarkers:
                 self._path("feet_ahead", side, scene.ahead[side], _AHEAD_WIDTH),
                 *self._reaction(side, scene.pose.feet[side], scene.reaction[side], force_scale),
             ]
+        for number, arc in enumerate(scene.torques):
+            markers += self._torque(number, arc)
         for marker in markers:
             marker.header.stamp = stamp
         return MarkerArray(markers=markers)
@@ -87,6 +96,19 @@ class SceneMarkers:
         label.scale.z = _TEXT_HEIGHT
         label.text = f"{size:.0f} N"
         return [arrow, label]
+
+    def _torque(self, number: int, arc: TorqueArc) -> list[Marker]:
+        """Return the arc of a joint torque, outside of the leg, and its size in words."""
+        side = number // 2
+        y = _BESIDE_LEG * self._sideways[side]
+        line = self._marker("joint_torques", number, Marker.LINE_STRIP, _TORQUE_COLOUR)
+        line.scale.x = _TORQUE_WIDTH
+        line.points = [_point(x, y, z) for x, z in arc.points.T.tolist()]
+        label = self._marker("joint_torque_sizes", number, Marker.TEXT_VIEW_FACING, _TORQUE_COLOUR)
+        label.scale.z = _TEXT_HEIGHT
+        label.text = f"{round(arc.torque, 1) + 0.0:.1f} N m"
+        label.pose.position = _point(arc.centre[0] + _LABEL_AHEAD[side], y, arc.centre[1] + _TEXT_HEIGHT)
+        return [line, label]
 
     def _ground(self, ground: FloatArray) -> list[Marker]:
         """Return the surface, and a line with a number at each metre of the way."""

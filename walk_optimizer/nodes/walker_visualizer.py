@@ -31,6 +31,8 @@ from walk_optimizer.scene.gait import ShownGait
 from walk_optimizer.scene.scene import WalkScene
 from walk_optimizer.scene.tracking import WalkerPose
 
+FloatArray = NDArray[np.float64]
+
 
 def _check_frame(name: str) -> None:
     if not name or name.startswith("/"):
@@ -60,6 +62,7 @@ SETTINGS = [
         "Whether the transforms of the links are published; false beside robot_state_publisher.",
     ),
     Setting("force_scale", 0.0008, "Length of the arrows of ground reactions [m/N].", 1e-6, 1.0),
+    Setting("torque_scale", 0.1, "Angle of the arcs of joint torques [rad/(N m)].", 1e-6, 100.0),
     Setting("trail_duration", 4.0, "How long the paths of the feet are kept [s].", 0.1, 60.0),
 ]
 
@@ -76,7 +79,9 @@ class WalkerVisualizerNode(SuiteNode):
         super().__init__("walker_visualizer", SETTINGS)
         self._walker, settings = walker_of(self.parameters["walker_file"]), description_settings()
         self._skeleton = skeleton_of(self._walker, settings)
-        self._scene = WalkScene(self._walker, self.parameters["trail_duration"])
+        self._scene = WalkScene(
+            self._walker, self.parameters["trail_duration"], self.parameters["torque_scale"]
+        )
         self._drawing = SceneMarkers(self.parameters["fixed_frame"], settings.leg_spacing)
         self._shown_ns: int | None = None
         self._description = self.create_publisher(String, "robot_description", LATCHED)
@@ -95,6 +100,8 @@ class WalkerVisualizerNode(SuiteNode):
     def _apply(self, names: set[str]) -> None:
         if "trail_duration" in names:
             self._scene.trail.duration = self.parameters["trail_duration"]
+        if "torque_scale" in names:
+            self._scene.torque_scale = self.parameters["torque_scale"]
 
     def _take_gait(self, message: GaitMessage) -> None:
         try:
@@ -112,14 +119,15 @@ class WalkerVisualizerNode(SuiteNode):
 
     def _take_reference(self, message: JointState) -> None:
         try:
-            position = positions_of(message)
+            position = joint_values(message, "position")
+            effort = joint_values(message, "effort") if message.effort else None
         except WalkOptimizerError as error:
             self.get_logger().warning(f"reference not shown: {error}", throttle_duration_sec=1.0)
             return
         pose = self._scene.move(position)
         stamp_ns = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
         if self._is_due(stamp_ns):
-            self._show(message, stamp_ns * 1e-9, pose)
+            self._show(message, pose, effort)
 
     def _is_due(self, stamp_ns: int) -> bool:
         """Whether a picture is due; a clock that went back counts as one."""
@@ -128,30 +136,30 @@ class WalkerVisualizerNode(SuiteNode):
         self._shown_ns = stamp_ns
         return True
 
-    def _show(self, message: JointState, time: float, pose: WalkerPose) -> None:
+    def _show(self, message: JointState, pose: WalkerPose, effort: FloatArray | None) -> None:
         stamp = message.header.stamp
         transforms = [base_transform(self.parameters["fixed_frame"], pose.base)]
         if self.parameters["link_transforms"]:
             transforms += link_transforms(self._skeleton, pose.position)
         self._transforms.publish(transforms_to_message(transforms, stamp))
-        scene = self._scene.show(time, pose)
+        scene = self._scene.show(stamp.sec + stamp.nanosec * 1e-9, pose, effort)
         self._markers.publish(self._drawing.draw(scene, stamp, self.parameters["force_scale"]))
 
 
-def positions_of(message: JointState) -> NDArray[np.float64]:
-    """Return the positions of the walker's joints, found by their names, (4,) in [rad].
+def joint_values(message: JointState, field: str) -> FloatArray:
+    """Return a field's numbers of the walker's joints, found by their names, (4,).
 
     Raises:
         ConfigurationError: a joint is missing, or a number is.
     """
-    places = dict(zip(message.name, message.position, strict=False))
-    missing = [name for name in JOINTS if name not in places]
+    found = dict(zip(message.name, getattr(message, field), strict=False))
+    missing = [name for name in JOINTS if name not in found]
     if missing:
-        raise ConfigurationError(f"no position of {', '.join(missing)}")
-    position = np.array([places[name] for name in JOINTS])
-    if not np.isfinite(position).all():
-        raise ConfigurationError("a position is not finite")
-    return position
+        raise ConfigurationError(f"no {field} of {', '.join(missing)}")
+    values = np.array([found[name] for name in JOINTS])
+    if not np.isfinite(values).all():
+        raise ConfigurationError(f"a number of {field} is not finite")
+    return values
 
 
 def main() -> int:
