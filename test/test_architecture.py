@@ -24,6 +24,7 @@ LAYERS = (
     ("gait", "refined_trajectory"),
     ("certificate", "replay", "refined_certificate"),
     ("search", "optimizer", "refinement", "table_builder"),
+    ("transition",),
     ("gait_files", "gait_csv"),
     ("library_entries", "library", "verification", "report_table"),
     ("profile", "references", "reference_check", "background"),

@@ -39,28 +39,28 @@ def certify_refined(walker: WalkerParameters, request: GaitRequest, gait: Refine
     nodes = trajectory.states[:, 1:].reshape(-1, 12).T
     mechanics = mechanics_at(walker, gait.spring, nodes[:6], nodes[6:])
     forces = trajectory.forces.reshape(-1, 4).T
-    error = _largest(interval_errors(walker, gait.spring, trajectory))
+    error = largest(interval_errors(walker, gait.spring, trajectory))
     shortfall = request.speed - gait.step_length / trajectory.step_time
     entries = [
-        *_collocation_entries(walker, trajectory, mechanics),
+        *collocation_entries(walker, trajectory, mechanics),
         CertificateEntry("interval_replay", error, "m, rad", _TOLERANCE),
-        *_jump_entries(walker, request, gait),
-        CertificateEntry("speed", _largest(np.maximum(shortfall, 0.0)), "m/s", _TOLERANCE),
+        *jump_entries(walker, gait, _state_before(walker, request, gait)),
+        CertificateEntry("speed", largest(np.maximum(shortfall, 0.0)), "m/s", _TOLERANCE),
         CertificateEntry("landing", _landing_error(walker, request, gait), "m", _TOLERANCE),
         *tread_entries(walker, request, gait.step_length),
-        *_contact_entries(walker, request, mechanics, forces),
-        *_bound_entries(walker, request, trajectory),
+        *contact_entries(walker, request.step_length, mechanics, forces),
+        *bound_entries(walker, request.step_length, trajectory),
         *spring_entries(walker, request.spring_mode, gait.spring),
     ]
     return Certificate(tuple(entries))
 
 
-def _largest(values: FloatArray) -> float:
+def largest(values: FloatArray) -> float:
     """Return the largest magnitude; not a number if any value is not."""
     return float(np.abs(values).max())
 
 
-def _collocation_entries(
+def collocation_entries(
     walker: WalkerParameters, trajectory: RefinedTrajectory, mechanics: Mechanics
 ) -> list[CertificateEntry]:
     """Return the defects of states and momenta at the nodes, per unit of time."""
@@ -70,27 +70,30 @@ def _collocation_entries(
     velocity_defect = flat[:6] - mechanics.qdot
     force_defect = flat[6:] - mechanics.momentum_rate(torques, forces)
     return [
-        CertificateEntry("kinematics", _largest(velocity_defect), "m/s, rad/s", _TOLERANCE),
-        CertificateEntry("dynamics", _largest(force_defect), "N, N m", RELATIVE_TOLERANCE * walker.weight),
+        CertificateEntry("kinematics", largest(velocity_defect), "m/s, rad/s", _TOLERANCE),
+        CertificateEntry("dynamics", largest(force_defect), "N, N m", RELATIVE_TOLERANCE * walker.weight),
     ]
 
 
-def _jump_entries(
-    walker: WalkerParameters, request: GaitRequest, gait: RefinedGait
-) -> list[CertificateEntry]:
-    """Return what the impacts leave over between the intervals, the last and the first included."""
+def _state_before(walker: WalkerParameters, request: GaitRequest, gait: RefinedGait) -> FloatArray:
+    """Return the last state (12,) as the next step sees it: legs relabelled, foot 2 at the origin."""
+    before: FloatArray = gait.trajectory.states[-1, -1][[*RELABELLED, *(6 + row for row in RELABELLED)]]
+    before[0] -= gait.step_length
+    before[1] -= walker.terrain.height(gait.step_length, request.step_length)
+    return before
+
+
+def jump_entries(walker: WalkerParameters, gait: RefinedGait, before: FloatArray) -> list[CertificateEntry]:
+    """Return what the impacts leave over between the intervals, `before` being the state before the step."""
     trajectory = gait.trajectory
-    ends = np.roll(trajectory.states[:, -1], 1, axis=0).T
-    ends[:, 0] = ends[[*RELABELLED, *(6 + row for row in RELABELLED)], 0]
-    ends[0, 0] -= gait.step_length
-    ends[1, 0] -= walker.terrain.height(gait.step_length, request.step_length)
+    ends = np.concatenate([before[None], trajectory.states[:-1, -1]]).T
     starts = trajectory.states[:, 0].T
     mechanics = mechanics_at(walker, gait.spring, starts[:6], starts[6:])
     impulse = mechanics.generalized(trajectory.impulses.T)
     tolerance = RELATIVE_TOLERANCE * walker.total_mass
     return [
-        CertificateEntry("continuity", _largest(starts[:6] - ends[:6]), "m, rad", _TOLERANCE),
-        CertificateEntry("impact", _largest(starts[6:] - ends[6:] - impulse), "N s, N m s", tolerance),
+        CertificateEntry("continuity", largest(starts[:6] - ends[:6]), "m, rad", _TOLERANCE),
+        CertificateEntry("impact", largest(starts[6:] - ends[6:] - impulse), "N s, N m s", tolerance),
         CertificateEntry("impact_cone", _cone_excess(walker, trajectory.impulses.T), "N s", tolerance),
     ]
 
@@ -107,38 +110,38 @@ def _landing_error(walker: WalkerParameters, request: GaitRequest, gait: Refined
     """Return how far foot 2 lands from one step length ahead, or from the ground."""
     end = gait.trajectory.states[-1, -1][:6, None]
     ground = walker.terrain.height(gait.step_length, request.step_length)
-    return _largest(foot_arm(walker, end, 1).position[:, 0] - np.array([gait.step_length, ground]))
+    return largest(foot_arm(walker, end, 1).position[:, 0] - np.array([gait.step_length, ground]))
 
 
-def _contact_entries(
-    walker: WalkerParameters, request: GaitRequest, mechanics: Mechanics, forces: FloatArray
+def contact_entries(
+    walker: WalkerParameters, tread: float, mechanics: Mechanics, forces: FloatArray
 ) -> list[CertificateEntry]:
     """Return what the feet do at the nodes: those under load stand, none is below the ground."""
-    gaps = np.array([walker.terrain.gap(foot.position, request.step_length) for foot in mechanics.feet])
+    gaps = np.array([walker.terrain.gap(foot.position, tread) for foot in mechanics.feet])
     loaded = np.array([forces[:2].any(axis=0), forces[2:].any(axis=0)])
     speeds = np.array([np.abs(mechanics.foot_velocity(leg)).max(axis=0) for leg in range(2)])
     force_tolerance = RELATIVE_TOLERANCE * walker.weight
     return [
-        CertificateEntry("stance_velocity", _largest(np.where(loaded, speeds, 0.0)), "m/s", _TOLERANCE),
-        CertificateEntry("stance_height", _largest(np.where(loaded, gaps, 0.0)), "m", _TOLERANCE),
-        CertificateEntry("penetration", _largest(np.minimum(gaps, 0.0)), "m", _TOLERANCE),
+        CertificateEntry("stance_velocity", largest(np.where(loaded, speeds, 0.0)), "m/s", _TOLERANCE),
+        CertificateEntry("stance_height", largest(np.where(loaded, gaps, 0.0)), "m", _TOLERANCE),
+        CertificateEntry("penetration", largest(np.minimum(gaps, 0.0)), "m", _TOLERANCE),
         CertificateEntry("friction_cone", _cone_excess(walker, forces), "N", force_tolerance),
     ]
 
 
-def _bound_entries(
-    walker: WalkerParameters, request: GaitRequest, trajectory: RefinedTrajectory
+def bound_entries(
+    walker: WalkerParameters, tread: float, trajectory: RefinedTrajectory
 ) -> list[CertificateEntry]:
     """Return violations of joint limits and forward momentum at the nodes, and of what may lie between."""
     nodes = trajectory.states[:, 1:].reshape(-1, 12).T
-    angle = _largest(_angle_excess(walker, nodes))
-    angles_between, dips_between = excess_between(walker, request.step_length, trajectory)
+    angle = largest(_angle_excess(walker, nodes))
+    angles_between, dips_between = excess_between(walker, tread, trajectory)
     tolerance = RELATIVE_TOLERANCE * walker.total_mass
     return [
         CertificateEntry("joint_limits", angle, "rad", _TOLERANCE),
-        CertificateEntry("joint_limits_between", _largest(angles_between), "rad", BETWEEN_TOLERANCE),
-        CertificateEntry("penetration_between", _largest(dips_between), "m", BETWEEN_TOLERANCE),
-        CertificateEntry("forward_momentum", _largest(np.minimum(nodes[6], 0.0)), "kg m/s", tolerance),
+        CertificateEntry("joint_limits_between", largest(angles_between), "rad", BETWEEN_TOLERANCE),
+        CertificateEntry("penetration_between", largest(dips_between), "m", BETWEEN_TOLERANCE),
+        CertificateEntry("forward_momentum", largest(np.minimum(nodes[6], 0.0)), "kg m/s", tolerance),
     ]
 
 

@@ -4,13 +4,26 @@ from functools import cache
 
 import casadi as ca
 
+from walk_optimizer.model.dynamics import velocity
 from walk_optimizer.model.ground import ground_height
-from walk_optimizer.model.kinematics import HIP_X, HIP_Y, RELABELLED, foot_position
+from walk_optimizer.model.kinematics import (
+    HIP_X,
+    HIP_Y,
+    KNEE_1,
+    KNEE_2,
+    RELABELLED,
+    UPPER_1,
+    UPPER_2,
+    foot_position,
+)
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.transcription import layout
 from walk_optimizer.transcription.compilation import compiled
 from walk_optimizer.transcription.scaling import point_units
 from walk_optimizer.transcription.stage import Ends
+
+# Rows of q that hold joint angles.
+JOINT_ROWS = (UPPER_1, KNEE_1, UPPER_2, KNEE_2)
 
 
 def end_functions(name: str, z: ca.SX, par: ca.SX, rows: ca.SX) -> list[ca.Function]:
@@ -56,14 +69,19 @@ def periodic_functions() -> list[ca.Function]:
 
 
 def given_start_functions() -> list[ca.Function]:
-    """Return the functions of a step that begins in a given state, the ends' own numbers, scaled.
+    """Return the functions of steps that begin in a given state, the ends' own numbers, scaled.
 
-    The one further row is the place where foot 2 ends, in leg lengths.
+    The further rows are the angles of hips and knees at the end, then their velocities, in [rad] and
+    [rad/s]: with a foot on the ground they determine the whole state.
     """
     walker, z = SymbolicWalker(), ca.SX.sym("z", layout.STATE_WIDTH)
     start = ca.SX.sym("start", layout.STATE_WIDTH)
-    q = (z * ca.vertcat(*point_units(walker)[: layout.STATE_WIDTH]))[layout.Q]
-    rows = ca.vertcat(start, foot_position(walker, q, 1)[0] / walker.leg_length)
+    q, p = ca.SX.sym("q", 6), ca.SX.sym("p", 6)
+    joints = list(JOINT_ROWS)
+    joint_state = ca.vertcat(q[joints], velocity(walker, q, p)[joints])
+    physical = z * ca.vertcat(*point_units(walker)[: layout.STATE_WIDTH])
+    end = ca.substitute(joint_state, ca.vertcat(q, p), physical)
+    rows = ca.vertcat(start, end)
     return end_functions("given_start", z, ca.vertcat(walker.symbols, start), rows)
 
 
@@ -75,5 +93,5 @@ def periodic_ends() -> Ends:
 
 @cache
 def given_start_ends() -> Ends:
-    """Return the ends of a step that begins in a given state."""
+    """Return the ends of steps that begin in a given state."""
     return Ends("given_start", compiled(given_start_functions))

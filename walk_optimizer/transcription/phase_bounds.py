@@ -34,24 +34,35 @@ def stage_bounds(layout: PhaseLayout, landing: Landing) -> list[RowBounds]:
         landing: Which feet land at the end of the last one.
     """
     bounds: list[RowBounds] = []
-    landings = [*(phase.landing for phase, _ in layout[1:]), landing]
-    for (phase, intervals), landing_after in zip(layout, landings, strict=True):
+    landings = [*((phase.landing, phase.begins_with_impact) for phase, _ in layout[1:]), (landing, True)]
+    for (phase, intervals), after in zip(layout, landings, strict=True):
         bounds += [impact_bounds(phase)] * phase.begins_with_impact
         bounds += [interval_bounds(phase.modes)] * (intervals - 1)
-        bounds.append(interval_bounds(phase.modes, landing_after))
+        bounds.append(_ended(interval_bounds(phase.modes), *after))
     return bounds
 
 
-def interval_bounds(modes: Modes, landing: Landing = (False, False)) -> RowBounds:
-    """Return the bounds of an interval's rows: dynamics, then contacts at each node.
-
-    The impact after it pins the gap of a landing foot, so the last node must not bound it once more.
-    """
+def interval_bounds(modes: Modes) -> RowBounds:
+    """Return the bounds of an interval's rows: dynamics, then contacts at each node."""
     contact = _contact_bounds(modes)
     dynamics = np.zeros(STAGES * STATE_WIDTH)
     low, high = (np.concatenate([dynamics, *[side] * STAGES]) for side in contact)
-    last_gaps = low[-radau.CONTACT_ROWS :][_GAP : _GAP + 2]
-    last_gaps[list(landing)] = -np.inf
+    return low, high
+
+
+def _ended(bounds: RowBounds, landing: Landing, with_impact: bool) -> RowBounds:
+    """Return the bounds of an interval at the end of which feet land.
+
+    What follows pins the gap of a landing foot, an impact or else the end of the chain: the last node
+    must not bound it once more. Without an impact the foot is set down, and at rest there.
+    """
+    low, high = bounds
+    last_low, last_high = low[-radau.CONTACT_ROWS :], high[-radau.CONTACT_ROWS :]
+    for foot in np.flatnonzero(landing):
+        last_low[_GAP + foot] = -np.inf
+        if not with_impact:
+            for row in (_TANGENTIAL + foot, _NORMAL + foot):
+                last_low[row] = last_high[row] = 0.0
     return low, high
 
 

@@ -21,7 +21,8 @@ class Phase:
     Attributes:
         modes: What each foot does.
         impact: What each foot does in the impact that begins the phase; `FREE` feet take no impulse.
-        landing: Which feet come down in that impact; the others that take part stood before.
+        landing: Which feet come down as the phase begins. In an impact, the others that take part stood
+            before; where the phase begins without one, the foot is set down softly.
         start: Where the phase begins, as a part of the step in [0, 1).
     """
 

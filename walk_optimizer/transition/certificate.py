@@ -1,0 +1,105 @@
+"""Residuals of a transition in plain NumPy and by an integrator, apart from the solver."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
+from walk_optimizer.mechanics import mechanics_at
+from walk_optimizer.model.kinematics import HIP_X, HIP_Y
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.refined_certificate import (
+    bound_entries,
+    collocation_entries,
+    contact_entries,
+    jump_entries,
+    largest,
+)
+from walk_optimizer.replay import interval_errors
+from walk_optimizer.transition.paces import Pace, border_state, next_step_sees, step_length, velocity
+
+FloatArray = NDArray[np.float64]
+
+_TOLERANCE = 1e-6
+# Joints of the source, of the steps and of the target meet this closely, in [rad].
+JOINT_TOLERANCE = 1e-8
+# Between the nodes torques are quadratic: they may be beyond their limit by this part of it.
+_TORQUE_TOLERANCE = 1e-6
+
+
+def certify_steps(
+    walker: WalkerParameters,
+    source: Pace,
+    target: Pace,
+    steps: Sequence[RefinedGait],
+    torque_limit: float,
+) -> tuple[tuple[RefinedGait, ...], Certificate]:
+    """Return the steps with their certificates, and that of the whole transition.
+
+    Args:
+        walker: The walker.
+        source: What the first step begins in.
+        target: What the last step ends in.
+        steps: The steps; their own certificates are not looked at.
+        torque_limit: Largest magnitude of each torque in [N m].
+    """
+    if not all(step.trajectory.is_finite for step in steps):
+        # An integrator would not come to an end.
+        return tuple(steps), Certificate((CertificateEntry("finite", np.inf, "-", 0.0),))
+    before, certified = border_state(source), []
+    for step in steps:
+        entries = _step_entries(walker, step, before, torque_limit)
+        certified.append(replace(step, certificate=Certificate(tuple(entries))))
+        before = next_step_sees(walker, step.trajectory.states[-1, -1])
+    joins = _arrival_entries(walker, before, border_state(target))
+    every = (entry for step in certified for entry in step.certificate.entries)
+    return tuple(certified), Certificate((*_largest_of_each(every), *joins))
+
+
+def _step_entries(
+    walker: WalkerParameters, step: RefinedGait, before: FloatArray, torque_limit: float
+) -> list[CertificateEntry]:
+    """Return the residuals of a step that begins in a state (12,)."""
+    trajectory = step.trajectory
+    nodes = trajectory.states[:, 1:].reshape(-1, 12).T
+    mechanics = mechanics_at(walker, step.spring, nodes[:6], nodes[6:])
+    forces = trajectory.forces.reshape(-1, 4).T
+    begin = trajectory.states[0, 0, :6] - before[:6]
+    landing = step_length(walker, trajectory.states[-1, -1]) - step.step_length
+    torque = max(0.0, float(np.abs(trajectory.torques).max()) - torque_limit)
+    replayed = largest(interval_errors(walker, step.spring, trajectory))
+    return [
+        *collocation_entries(walker, trajectory, mechanics),
+        CertificateEntry("interval_replay", replayed, "m, rad", _TOLERANCE),
+        *jump_entries(walker, step, before),
+        CertificateEntry("departure", largest(begin), "m, rad", JOINT_TOLERANCE),
+        CertificateEntry("landing", abs(landing), "m", _TOLERANCE),
+        *contact_entries(walker, step.step_length, mechanics, forces),
+        *bound_entries(walker, step.step_length, trajectory),
+        CertificateEntry("torque_limit", torque, "N m", _TORQUE_TOLERANCE * walker.weight),
+    ]
+
+
+def _arrival_entries(
+    walker: WalkerParameters, reached: FloatArray, wanted: FloatArray
+) -> list[CertificateEntry]:
+    """Return how far the state (12,) that the last step ends in is from the target's."""
+    apart = reached[:6] - wanted[:6]
+    speeds = velocity(walker, reached) - velocity(walker, wanted)
+    return [
+        CertificateEntry("arrival_joints", largest(apart[2:]), "rad", JOINT_TOLERANCE),
+        CertificateEntry("arrival_hip", largest(apart[[HIP_X, HIP_Y]]), "m", _TOLERANCE),
+        CertificateEntry("arrival_velocity", largest(speeds), "m/s, rad/s", _TOLERANCE),
+    ]
+
+
+def _largest_of_each(entries: Iterable[CertificateEntry]) -> tuple[CertificateEntry, ...]:
+    """Return the worst entry of each family."""
+    worst: dict[str, CertificateEntry] = {}
+    for entry in entries:
+        known = worst.get(entry.family)
+        if known is None or not entry.relative <= known.relative:
+            worst[entry.family] = entry
+    return tuple(worst.values())

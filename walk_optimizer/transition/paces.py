@@ -1,0 +1,86 @@
+"""What a transition leads from and to: a gait or a stand, as states at the border between two steps."""
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.gait import Gait, RefinedGait
+from walk_optimizer.mechanics import foot_arm, mechanics_at
+from walk_optimizer.model.kinematics import HIP_X, RELABELLED
+from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.transition.standing import Standing
+
+FloatArray = NDArray[np.float64]
+
+# A pace goes on without end: a gait repeats its step, a stand stays.
+Pace: TypeAlias = Gait | Standing
+# Rows of a state with the names of the legs exchanged.
+EXCHANGED = np.array([*RELABELLED, *(6 + row for row in RELABELLED)])
+
+
+def refined_of(gait: Gait) -> RefinedGait:
+    """Return the accurate solution of a gait.
+
+    Raises:
+        InvalidRequestError: it has none that is certified, so no step can be joined to it exactly.
+    """
+    if gait.refined is None or not gait.refined.certificate.certified:
+        raise InvalidRequestError(
+            f"the gait of {gait.request.speed:.4f} m/s has no certified refined part; "
+            "transitions begin and end at refined gaits: solve it with refinement"
+        )
+    return gait.refined
+
+
+def spring_of(pace: Pace) -> KneeSpring:
+    """Return the knee spring of a pace."""
+    return pace.spring if isinstance(pace, Standing) else refined_of(pace).spring
+
+
+def border_state(pace: Pace) -> FloatArray:
+    """Return the state (12,) in which a pace is left and reached, as the step that follows sees it."""
+    if isinstance(pace, Standing):
+        return pace.state
+    return next_step_sees(pace.walker, refined_of(pace).trajectory.states[-1, -1])
+
+
+def next_step_sees(walker: WalkerParameters, state: FloatArray) -> FloatArray:
+    """Return the state (12,) at the end of a step in the next step's words.
+
+    The legs exchange names, and the origin is where foot 2 stands.
+    """
+    seen: FloatArray = state[EXCHANGED]
+    seen[HIP_X] -= step_length(walker, state)
+    return seen
+
+
+def former_step_sees(walker: WalkerParameters, state: FloatArray) -> FloatArray:
+    """Return the state (12,) before a step as the step before it sees it: undoes `next_step_sees`."""
+    foot_behind = foot_arm(walker, state[:6, None], 1).position[0, 0]
+    seen: FloatArray = state[EXCHANGED]
+    seen[HIP_X] -= foot_behind
+    return seen
+
+
+def step_length(walker: WalkerParameters, state: FloatArray) -> float:
+    """Return where foot 2 is in a state (12,), in [m] ahead of the origin."""
+    return float(foot_arm(walker, state[:6, None], 1).position[0, 0])
+
+
+def velocity(walker: WalkerParameters, state: FloatArray) -> FloatArray:
+    """Return qdot (6,) in a state (12,)."""
+    return mechanics_at(walker, KneeSpring(), state[:6, None], state[6:, None]).qdot[:, 0]
+
+
+def with_legs_exchanged(trajectory: RefinedTrajectory) -> RefinedTrajectory:
+    """Return a trajectory with the names of the legs exchanged."""
+    return RefinedTrajectory(
+        trajectory.breaks,
+        trajectory.states[:, :, EXCHANGED],
+        trajectory.torques[:, :, [0, 2, 1]] * np.array([-1.0, 1.0, 1.0]),
+        trajectory.forces[:, :, [2, 3, 0, 1]],
+        trajectory.impulses[:, [2, 3, 0, 1]],
+    )

@@ -1,0 +1,259 @@
+"""Solves for the steps from one pace to another: first guess, adapted mesh, certificate."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.gait import Certificate, RefinedGait
+from walk_optimizer.model.kinematics import HIP_X
+from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.refined_certificate import BETWEEN_TOLERANCE, excess_between
+from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.refinement import LOCAL_ERROR, RefinedSolution, _divided, _trajectory
+from walk_optimizer.replay import interval_errors
+from walk_optimizer.solve.session import SolveSession
+from walk_optimizer.solve.settings import SolverSettings, solver_settings
+from walk_optimizer.solve.status import FamilyViolation, ProgressCallback, SolveReport, Status
+from walk_optimizer.transcription.boundary import JOINT_ROWS
+from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
+from walk_optimizer.transcription.scaling import torque_unit
+from walk_optimizer.transcription.transition import End, TransitionLimits, TransitionProblem
+from walk_optimizer.transition.certificate import certify_steps
+from walk_optimizer.transition.guess import even_mesh, faded_points
+from walk_optimizer.transition.paces import (
+    EXCHANGED,
+    Pace,
+    border_state,
+    former_step_sees,
+    spring_of,
+    step_length,
+    velocity,
+    with_legs_exchanged,
+)
+from walk_optimizer.transition.plan import ContactPlan, contact_plan
+from walk_optimizer.transition.settings import TransitionSettings, transition_settings
+from walk_optimizer.transition.standing import Standing
+from walk_optimizer.transition.transition import Transition, TransitionOutcome
+
+FloatArray = NDArray[np.float64]
+
+# Barrier parameters for a start from a faded guess, and from a coarser mesh.
+_FIRST_BARRIER, _NEXT_BARRIER = 1e-3, 1e-5
+_ROUNDS = 5
+_SAFETY = 0.5
+# On level ground the length of treads plays no part.
+_ANY_TREAD = 1.0
+
+
+def plan_transition(
+    walker: WalkerParameters,
+    source: Pace,
+    target: Pace,
+    *,
+    steps: int | None = None,
+    torque_limit: float = np.inf,
+    settings: TransitionSettings | None = None,
+    solver: SolverSettings | None = None,
+    time_limit: float | None = None,
+    progress: ProgressCallback | None = None,
+) -> TransitionOutcome:
+    """Solve for the steps of least torque from one pace to another.
+
+    Args:
+        walker: The walker.
+        source: The gait or stand that is left.
+        target: The gait or stand that is reached; one of both is a gait.
+        steps: Number of steps; None means that of the settings, and one more where that has no solution.
+        torque_limit: Largest magnitude of each torque in [N m].
+        settings: Of steps; the packaged ones by default.
+        solver: Settings of the solver; the packaged ones by default.
+        time_limit: In [s], above 0; the solver settings' by default.
+        progress: Called at every iteration; returning False cancels the solve.
+
+    Returns:
+        The transition and the report. A solve that fails gives none and raises nothing.
+
+    Raises:
+        InvalidRequestError: the request makes no sense whatever is computed; says why.
+    """
+    settings, solver = settings or transition_settings(), solver or solver_settings()
+    limit = solver.time_limit if time_limit is None else time_limit
+    _check(walker, source, target, steps, torque_limit, limit, settings)
+    session = SolveSession(solver, limit, progress)
+    request = _Request(walker, source, target, torque_limit, settings)
+    numbers = (steps,) if steps else range(settings.steps, min(settings.steps + 1, settings.most_steps) + 1)
+    for number in numbers:
+        outcome = _Solve(request, number, session).run()
+        if outcome.transition is not None or session.stopped:
+            break
+    return outcome
+
+
+@dataclass(frozen=True, eq=False)
+class _Request:
+    """What was asked for."""
+
+    walker: WalkerParameters
+    source: Pace
+    target: Pace
+    torque_limit: float
+    settings: TransitionSettings
+
+    @property
+    def spring(self) -> KneeSpring:
+        """The target's spring; on the way to a stand the source's."""
+        return spring_of(self.source if isinstance(self.target, Standing) else self.target)
+
+
+def _check(
+    walker: WalkerParameters,
+    source: Pace,
+    target: Pace,
+    steps: int | None,
+    torque_limit: float,
+    time_limit: float,
+    settings: TransitionSettings,
+) -> None:
+    """Raise InvalidRequestError for a request that makes no sense."""
+    if not walker.terrain.is_flat:
+        raise InvalidRequestError("transitions are solved on level ground, the walker's terrain is not level")
+    if isinstance(source, Standing) and isinstance(target, Standing):
+        raise InvalidRequestError("a transition needs a gait at one of its ends, both are stands")
+    for pace in (source, target):
+        if pace.walker != walker:
+            raise InvalidRequestError("source and target must be for the walker of the transition")
+        spring_of(pace)
+    if steps is not None and not (isinstance(steps, int) and 1 <= steps <= settings.most_steps):
+        raise InvalidRequestError(f"steps is {steps!r}, allowed is 1 to {settings.most_steps}")
+    for name, value, unit in (("torque limit", torque_limit, "N m"), ("time limit", time_limit, "s")):
+        if not value > 0:
+            raise InvalidRequestError(f"{name} is {value} {unit}, allowed is above 0")
+
+
+class _Solve:
+    """One number of steps."""
+
+    def __init__(self, request: _Request, steps: int, session: SolveSession) -> None:
+        self.request, self.session = request, session
+        self.walker, self.spring = request.walker, request.spring
+        self.plan = contact_plan(request.source, request.target, steps)
+        self.phases = tuple(len(phases) for phases in self.plan.steps)
+        settings = request.settings
+        limits = TransitionLimits(request.torque_limit, settings.shortest_step, settings.longest_step)
+        self.limits = limits
+        self.end = _end(request.target, self.plan)
+
+    def run(self) -> TransitionOutcome:
+        """Return the transition on a mesh fine enough for its error."""
+        mesh = even_mesh(self.plan)
+        points = faded_points(self.plan, mesh, self.request.source, self.request.target, self.spring)
+        barrier = _FIRST_BARRIER
+        for _ in range(_ROUNDS):
+            status, points = self._solved(mesh, points, barrier)
+            trajectory = _trajectory(mesh, points)
+            if status is not Status.SOLVED:
+                break
+            errors = interval_errors(self.walker, self.spring, trajectory)
+            excess = np.max(excess_between(self.walker, _ANY_TREAD, trajectory), axis=0)
+            if errors.max() <= LOCAL_ERROR and excess.max() <= _SAFETY * BETWEEN_TOLERANCE:
+                break
+            solution = RefinedSolution(status, mesh, trajectory, self.spring)
+            (mesh, points), barrier = _divided(solution, errors, excess), _NEXT_BARRIER
+        return self._outcome(status, mesh, trajectory)
+
+    def _solved(self, mesh: Mesh, points: RefinedPoints, barrier: float) -> tuple[Status, RefinedPoints]:
+        """Solve on a mesh from a start; return how it ended and where."""
+        problem = TransitionProblem(
+            self.walker,
+            mesh,
+            self.phases,
+            border_state(self.request.source),
+            self.end,
+            self.spring,
+            self.limits,
+        )
+        unit = torque_unit(self.walker) ** 2
+        solution = self.session.solve(
+            problem.problem(), problem.pack(points), "transition", objective_unit=unit, barrier=barrier
+        )
+        return solution.status, problem.unpack(solution.x)
+
+    def _outcome(self, status: Status, mesh: Mesh, trajectory: RefinedTrajectory) -> TransitionOutcome:
+        """Return the certified steps, or the report of why there are none."""
+        request = self.request
+        bare = self._steps(mesh, trajectory)
+        steps, certificate = certify_steps(
+            self.walker, request.source, request.target, bare, request.torque_limit
+        )
+        if status is Status.SOLVED and not certificate.certified:
+            status = Status.NOT_CERTIFIED
+        status = self.session.verdict or status
+        report = self._report(status, certificate, trajectory.torque_effort)
+        if status is not Status.SOLVED:
+            return TransitionOutcome(None, report)
+        transition = Transition(
+            self.walker, request.source, request.target, steps, request.torque_limit, certificate
+        )
+        return TransitionOutcome(transition, report)
+
+    def _steps(self, mesh: Mesh, trajectory: RefinedTrajectory) -> list[RefinedGait]:
+        """Cut the chain into steps, each seen from its own stance foot."""
+        counts = np.array([part.size for part in mesh.parts])
+        ends = np.cumsum([int(own.sum()) for own in np.split(counts, np.cumsum(self.phases)[:-1])])
+        steps, origin = [], 0.0
+        for number, (first, end) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
+            step = _seen_from(_cut(trajectory, int(first), int(end)), origin, exchanged=number % 2 == 1)
+            length = step_length(self.walker, step.states[-1, -1])
+            steps.append(RefinedGait(step, self.spring, length, Certificate(())))
+            origin += length
+        return steps
+
+    def _report(self, status: Status, certificate: Certificate, effort: float) -> SolveReport:
+        remarks = [status.sentence.replace("gait", "transition")]
+        if status not in (Status.SOLVED, Status.CANCELLED) and not certificate.worst.met:
+            remarks.append(str(certificate.worst))
+        return SolveReport(
+            status,
+            "; ".join(remarks),
+            "ipopt",
+            start=f"faded, {len(self.phases)} steps",
+            starts=1,
+            iterations=self.session.iterations,
+            solve_time=self.session.elapsed,
+            objective=effort if status is Status.SOLVED else np.nan,
+            violations=tuple(
+                FamilyViolation(one.family, one.violation, one.unit) for one in certificate.entries
+            ),
+        )
+
+
+def _end(target: Pace, plan: ContactPlan) -> End:
+    """Return the end of a chain of steps that leads to a pace, the legs named as in its first step."""
+    state = former_step_sees(target.walker, border_state(target))
+    if len(plan.steps) % 2 == 0:
+        state = state[EXCHANGED]
+    joints = list(JOINT_ROWS)
+    speeds = velocity(target.walker, state)[joints]
+    return End(state[joints], speeds, plan.landing, at_rest=isinstance(target, Standing))
+
+
+def _cut(trajectory: RefinedTrajectory, first: int, end: int) -> RefinedTrajectory:
+    """Return some of the intervals, their time beginning with 0."""
+    part = slice(first, end)
+    return RefinedTrajectory(
+        trajectory.breaks[first : end + 1] - trajectory.breaks[first],
+        trajectory.states[part],
+        trajectory.torques[part],
+        trajectory.forces[part],
+        trajectory.impulses[part],
+    )
+
+
+def _seen_from(trajectory: RefinedTrajectory, origin: float, exchanged: bool) -> RefinedTrajectory:
+    """Return a trajectory as a step sees it whose stance foot is at a place in [m] along the way."""
+    seen = with_legs_exchanged(trajectory) if exchanged else trajectory
+    states = np.array(seen.states)
+    states[:, :, HIP_X] -= origin
+    return replace(seen, states=states)
