@@ -112,10 +112,17 @@ class Walk:
             self._plan = plan
             return True
 
-    def stay(self) -> None:
-        """Keep the present pace, whatever was planned."""
+    def stay(self, pace: StepProfile) -> bool:
+        """Keep the present pace, whatever was planned.
+
+        Returns:
+            Whether it is the one that is meant; if not, nothing has changed.
+        """
         with self._lock:
+            if pace is not self._pace:
+                return False
             self._plan = None
+            return True
 
     def advance(self, clock: float) -> Reference:
         """Move on to a time of the clock in [s] and return the reference there."""

@@ -60,15 +60,20 @@ def other_walker(tmp_path_factory):
     return path
 
 
-@pytest.fixture
-def stocked(other_walker, tmp_path):
-    """Parameters of a library node with two gaits, made up and therefore there at once; FAST is refined."""
-    folder = tmp_path / "gaits"
-    folder.mkdir()
+def stock(folder, walker_file):
+    """Return parameters of a library node with two gaits, made up and so there at once; FAST is refined."""
+    gaits = folder / "gaits"
+    gaits.mkdir()
     walker = WalkerParameters(hip_mass=HIP_MASS)
-    library = GaitLibrary(walker, folder)
+    library = GaitLibrary(walker, gaits)
     for speed, torque in ((SLOW, 1.0), (FAST, 3.0)):
         mode = "stiffness_and_equilibrium"
         gait = made_up_gait(speed=speed, mode=mode, torque=torque, walker=walker)
         library.store(with_refinement(gait) if speed == FAST else gait)
-    return {"walker_file": other_walker, "cache_folder": folder, "points": 20}
+    return {"walker_file": walker_file, "cache_folder": gaits, "points": 20}
+
+
+@pytest.fixture
+def stocked(other_walker, tmp_path):
+    """Parameters of a library node that is stocked."""
+    return stock(tmp_path, other_walker)

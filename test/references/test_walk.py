@@ -46,7 +46,7 @@ EVENTS = st.lists(
 
 def go(walk, goal):
     if goal is walk.pace:
-        walk.stay()
+        assert walk.stay(goal)
     else:
         assert walk.follow(PLANS[walk.pace, goal])
 
@@ -145,7 +145,8 @@ def test_of_several_plans_the_last_one_counts_and_one_from_elsewhere_is_refused(
     run(walk, 0.0, 2.5 * SLOW.step_time)
     assert walk.pace is STAND
     walk.follow(PLANS[STAND, FAST])
-    walk.stay()
+    assert not walk.stay(FAST)
+    assert walk.stay(STAND)
     run(walk, 10.0, 0.1)
     assert walk.pace is STAND
 

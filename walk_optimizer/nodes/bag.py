@@ -5,10 +5,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
+from walk_optimizer.nodes.qos_warnings import warn_of_subscribers
+from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.recording import Recorder, RecorderSettings, TopicInfo
 from walk_optimizer.recording.errors import RecordingError
 from walk_optimizer.recording.ros_messages import serialize, topic_info
@@ -29,9 +30,10 @@ def new_bag_folder(folder: str) -> Path:
 class RecordedTopic:
     """A publisher and what a bag says about its topic."""
 
-    def __init__(self, node: Node, kind: type, name: str, qos: QoSProfile, bag: "StreamBag") -> None:
+    def __init__(self, node: SuiteNode, kind: type, name: str, qos: QoSProfile, bag: "StreamBag") -> None:
         """Create the publisher and announce it to the bag."""
-        self._publisher: Publisher = node.create_publisher(kind, name, qos)
+        events = warn_of_subscribers(node, name, qos)
+        self._publisher: Publisher = node.create_publisher(kind, name, qos, event_callbacks=events)
         self._bag = bag
         self.info: TopicInfo = topic_info(self._publisher.topic_name, kind, qos)
         bag.topics.append(self)

@@ -1,6 +1,5 @@
 """The stream of references: each tick of the clock becomes the messages of that instant."""
 
-from rclpy.node import Node
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -13,6 +12,7 @@ from walk_optimizer.nodes.pacer import Pacer
 from walk_optimizer.nodes.qos import LATCHED, STREAM
 from walk_optimizer.nodes.stream_messages import StreamFormat, StreamMessages
 from walk_optimizer.nodes.streamed_gait import StreamedGait
+from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.walk_report import WalkReport
 from walk_optimizer.phase_clock import PhaseClock
 from walk_optimizer.profile import StepProfile
@@ -26,7 +26,7 @@ class JointStream:
     Owns the thread that publishes. The rest is called from the node's executor.
     """
 
-    def __init__(self, node: Node, bag: StreamBag) -> None:
+    def __init__(self, node: SuiteNode, bag: StreamBag) -> None:
         """Create the topics; nothing is published before `start`.
 
         Args:
@@ -42,6 +42,7 @@ class JointStream:
         self._states = RecordedTopic(node, WalkState, "~/state", LATCHED, bag)
         self._messages = StreamMessages(StreamFormat())
         self._running = True
+        self._report: WalkReport | None = None
         self._pacer: Pacer | None = None
 
     @property
@@ -73,7 +74,7 @@ class JointStream:
         self.walk = Walk(stand, PhaseClock())
         self._known: dict[StepProfile, StreamedGait] = {}
         self._announced: StepProfile | None = None
-        self._report: WalkReport | None = None
+        self._report = None
         self._begin_ns = self._node.get_clock().now().nanoseconds
         self._last_ns = -1
         self._pacer = Pacer(1 / rate, self._tick)

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
@@ -16,6 +17,7 @@ from walk_optimizer.nodes.bag import StreamBag
 from walk_optimizer.nodes.cycle_message import cycle_to_message
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.lifecycle import ManagedNode, NotActiveError
+from walk_optimizer.nodes.publisher_health import PublisherHealth
 from walk_optimizer.nodes.publisher_settings import (
     FORMAT_SETTINGS,
     LIMIT_SETTINGS,
@@ -46,6 +48,7 @@ class ReferencePublisherNode(ManagedNode):
     def __init__(self) -> None:
         """Declare the parameters; `configure` does the rest."""
         super().__init__("reference_publisher", SETTINGS)
+        self._undo = ExitStack()
         self.add_on_set_parameters_callback(self._keep_limits_met)
         self.parameters.apply_changes(self._apply)
 
@@ -56,8 +59,11 @@ class ReferencePublisherNode(ManagedNode):
         self._stream = JointStream(self, self._bag)
         library = self.connect(GetGait, self.parameters["library_service"])
         self._commands = WalkCommands(self, self._stream, library)
-        self._speeds = SpeedCommands(self, self._commands, self._wall)
+        self._speeds = SpeedCommands(self, self._commands)
         self._recording = RecordingControl(self, self._bag, self._stream)
+        health = PublisherHealth(self.diagnostics, self._stream, self._speeds, self._bag)
+        for end in (health.close, self._recording.close, self._stream.stop):
+            self._undo.callback(end)
         self.serve(SetGait, "~/set_gait", self._set_gait)
         self.serve(GetJointTrajectory, "~/joint_trajectory", self._joint_trajectory)
         for name in ("stop", "pause", "resume", "emergency_stop"):
@@ -78,6 +84,10 @@ class ReferencePublisherNode(ManagedNode):
         self._speeds.forget()
         self._stream.stop()
         self._recording.close()
+
+    def cleanup(self) -> None:
+        """End what is no ROS entity, as far as `configure` came."""
+        self._undo.close()
 
     async def _set_gait(self, request: SetGait.Request, response: SetGait.Response) -> None:
         wanted = GaitRequest.for_speed(request.speed, request.spring_mode)

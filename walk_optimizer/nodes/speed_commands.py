@@ -4,13 +4,13 @@ import time
 from dataclasses import dataclass
 
 from geometry_msgs.msg import Twist
-from rclpy.clock import Clock
 from std_msgs.msg import Float64
 
 from walk_optimizer.command_watch import CommandWatch
 from walk_optimizer.errors import WalkOptimizerError
 from walk_optimizer.nodes.lifecycle import ManagedNode
 from walk_optimizer.nodes.qos import COMMAND
+from walk_optimizer.nodes.qos_warnings import warn_of_publishers
 from walk_optimizer.nodes.walk_commands import SupersededError, WalkCommands
 from walk_optimizer.request import GaitRequest
 
@@ -40,13 +40,12 @@ class SpeedCommands:
     A speed that is refused changes nothing, and keeps no stream alive. Speed 0 is a stop.
     """
 
-    def __init__(self, node: ManagedNode, commands: WalkCommands, wall: Clock) -> None:
+    def __init__(self, node: ManagedNode, commands: WalkCommands) -> None:
         """Subscribe.
 
         Args:
             node: That subscribes.
             commands: That carry out what is asked for.
-            wall: A clock that also runs while a simulation stands still.
         """
         self._node, self._commands = node, commands
         self.watch = CommandWatch(node.parameters["command_timeout"])
@@ -58,8 +57,11 @@ class SpeedCommands:
             (Float64, "~/target_speed", self._on_target_speed),
             (Twist, "~/cmd_vel", self._on_twist),
         ):
-            node.create_subscription(kind, topic, callback, COMMAND, callback_group=node.group)
-        node.create_timer(_WATCH_PERIOD, self._look, node.group, wall)
+            events = warn_of_publishers(node, topic, COMMAND)
+            node.create_subscription(
+                kind, topic, callback, COMMAND, callback_group=node.group, event_callbacks=events
+            )
+        node.repeat(_WATCH_PERIOD, self._look)
 
     def forget(self) -> None:
         """Drop what was asked for: another command has come than by these topics."""

@@ -96,6 +96,7 @@ class WalkCommands:
     async def stop(self) -> str:
         """Have the walk come to a stand, and return a sentence about it."""
         await self._lead_to(self._stand, None, self._take_order())
+        self._peaks = peaks_of([self._stand])
         return "comes to a stand after the running step"
 
     def _require_no_emergency(self) -> None:
@@ -128,6 +129,8 @@ class WalkCommands:
         """Have the stream walk to another pace from the one that it then has."""
         while True:
             self._require_newest(order)
+            if self._stream.walk.stay(goal):
+                return
             plan = blended(self._stream.walk.pace, goal, self._leg_length)
             if self._stream.follow(plan, gait):
                 return

@@ -1,0 +1,96 @@
+"""The publisher as a managed node, and several walkers in one graph."""
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from nodes.conftest import FAST, SLOW
+from nodes.graph import assert_left_cleanly
+from nodes.walking import NODE, Walker, assert_continuous
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+from walk_optimizer_interfaces.srv import StartRecording
+
+from walk_optimizer.recording import describe_bag
+
+pytestmark = pytest.mark.ros
+
+STANDING = [0.0, pytest.approx(3.14159265), 0.0, pytest.approx(3.14159265)]
+
+
+def change(graph, transition):
+    request = Transition(id=transition)
+    return graph.call(ChangeState, f"{NODE}/change_state", transition=request).success
+
+
+def state(graph):
+    return graph.call(GetState, f"{NODE}/get_state").current_state.label
+
+
+def test_a_manager_decides_when_references_are_streamed(graph, start, stocked, tmp_path):
+    start("gait_library", **stocked)
+    node = start(NODE, autostart=False, longest_gap=10.0)
+    assert state(graph) == "unconfigured"
+    assert change(graph, Transition.TRANSITION_CONFIGURE)
+    walker = Walker(graph)
+    joints = walker.listen(JointState, "joint_reference")
+    refused = walker.set_gait(FAST)
+    assert (refused.success, "is inactive" in refused.message) == (False, True)
+    graph.spin_for(0.3)
+    assert not joints
+    assert change(graph, Transition.TRANSITION_ACTIVATE)
+    graph.spin_until(lambda: joints, "the stand")
+    assert list(joints[0].position) == STANDING
+    walker.walk(FAST)
+    bag = tmp_path / "bag"
+    assert graph.call(StartRecording, f"{NODE}/start_recording", directory=str(bag)).success
+    assert change(graph, Transition.TRANSITION_DEACTIVATE)
+    assert describe_bag(bag).is_whole
+    graph.spin_for(0.3)
+    joints.clear()
+    graph.spin_for(0.3)
+    assert not joints
+    # From the beginning: nobody knows where the robot has gone meanwhile.
+    assert change(graph, Transition.TRANSITION_CLEANUP)
+    assert change(graph, Transition.TRANSITION_CONFIGURE)
+    assert change(graph, Transition.TRANSITION_ACTIVATE)
+    graph.spin_until(lambda: joints, "the stand again")
+    assert list(joints[0].position) == STANDING
+    assert_left_cleanly(node, node.stop())
+
+
+def test_a_configuration_that_fails_says_why(graph, start, tmp_path):
+    walker_file = tmp_path / "walker.yaml"
+    walker_file.write_text("hip_mass: 45.0\n")
+    node = start(NODE, autostart=False, walker_file=walker_file)
+    assert state(graph) == "unconfigured"
+    walker_file.unlink()
+    assert not change(graph, Transition.TRANSITION_CONFIGURE)
+    assert state(graph) == "unconfigured"
+    graph.spin_until(lambda: f"can't configure: {walker_file}" in node.output(), "the reason")
+    walker_file.write_text("hip_mass: 45.0\n")
+    assert change(graph, Transition.TRANSITION_CONFIGURE)
+    assert_left_cleanly(node, node.stop())
+
+
+def test_two_walkers_in_one_graph_walk_each_for_itself(graph, start, stocked):
+    names = ("one", "two")
+    for name in names:
+        start("gait_library", namespace=name, **stocked)
+        start(NODE, namespace=name, longest_gap=10.0, rate=100.0)
+    one, two = (Walker(graph, name) for name in names)
+    joints = [walker.listen(JointState, "joint_reference") for walker in (one, two)]
+    one.talk(Float64, "target_speed").publish(Float64(data=SLOW))
+    two.talk(Float64, "target_speed").publish(Float64(data=FAST))
+    one.wait_for("walking", SLOW)
+    two.wait_for("walking", FAST)
+    two.trigger("emergency_stop")
+    two.wait_for("emergency_stop")
+    graph.spin_for(0.3)
+    assert one.states[-1].state == "walking"
+    for stream in joints:
+        assert_continuous(stream)
+    assert any(joints[0][-1].velocity)
+    assert not any(joints[1][-1].velocity)

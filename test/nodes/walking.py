@@ -1,0 +1,70 @@
+"""What tests of the publisher have in common: commands, and waiting for what they lead to."""
+
+from itertools import pairwise
+
+from nodes.graph import SETTLING
+from rclpy.qos import QoSProfile
+from std_srvs.srv import Trigger
+from walk_optimizer_interfaces.msg import WalkState
+from walk_optimizer_interfaces.srv import SetGait
+
+from walk_optimizer.nodes.qos import LATCHED
+
+MODE = "stiffness_and_equilibrium"
+NODE = "reference_publisher"
+ALL = QoSProfile(depth=20_000)
+
+
+class Walker:
+    """A publisher that a test commands."""
+
+    def __init__(self, graph, namespace=""):
+        self.graph = graph
+        self.node = f"{namespace}/{NODE}".lstrip("/")
+        self.states = graph.subscribe(WalkState, f"{self.node}/state", LATCHED)
+
+    def topic(self, name):
+        return f"{self.node}/{name}"
+
+    def trigger(self, name):
+        answer = self.graph.call(Trigger, self.topic(name))
+        assert answer.success, answer.message
+        return answer.message
+
+    def set_gait(self, speed, mode=MODE):
+        return self.graph.call(SetGait, self.topic("set_gait"), speed=speed, spring_mode=mode)
+
+    def walk(self, speed):
+        """Have a gait walked, and wait until the steps that lead to it are over."""
+        answer = self.set_gait(speed)
+        assert answer.success, answer.message
+        self.wait_for("walking", speed)
+
+    def wait_for(self, state, speed=None):
+        def there():
+            last = self.states[-1] if self.states else None
+            return last and last.state == state and (speed is None or abs(last.speed - speed) < 1e-6)
+
+        self.graph.spin_until(there, f"{state} at {speed} m/s")
+
+    def listen(self, kind, name):
+        return self.graph.subscribe(kind, self.topic(name), ALL)
+
+    def talk(self, kind, name):
+        """Return a publisher that the node hears."""
+        publisher = self.graph.publisher(kind, self.topic(name))
+        self.graph.spin_for(SETTLING)
+        return publisher
+
+
+def stamp_ns(message):
+    return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+
+
+def assert_continuous(joints, fastest=40.0):
+    """Assert that no position jumps; velocities are bounded, so position changes are."""
+    for before, after in pairwise(joints):
+        elapsed = (stamp_ns(after) - stamp_ns(before)) * 1e-9
+        assert elapsed > 0
+        moved = max(abs(a - b) for a, b in zip(after.position, before.position, strict=True))
+        assert moved <= fastest * elapsed + 1e-9

@@ -1,0 +1,84 @@
+"""What the reference publisher tells operators about itself on `/diagnostics`."""
+
+from walk_optimizer.nodes.bag import StreamBag
+from walk_optimizer.nodes.diagnostics import Diagnostics, Finding, Level
+from walk_optimizer.nodes.joint_stream import JointStream
+from walk_optimizer.nodes.speed_commands import SpeedCommands
+from walk_optimizer.phase_clock import Motion
+from walk_optimizer.recording.disk import free_bytes
+from walk_optimizer.recording.status import RecorderStatus
+
+_CHECKS = ("walk", "timing", "recording")
+_MILLISECONDS = 1e3
+_MEGABYTE = 1e6
+
+
+class PublisherHealth:
+    """The checks of the publisher. Owns their sentences, not what they look at."""
+
+    def __init__(
+        self, diagnostics: Diagnostics, stream: JointStream, speeds: SpeedCommands, bag: StreamBag
+    ) -> None:
+        """Add the checks to a node's."""
+        self._diagnostics, self._stream, self._speeds, self._bag = diagnostics, stream, speeds, bag
+        for name, check in zip(_CHECKS, (self._walk, self._timing, self._recording), strict=True):
+            diagnostics.add(name, check)
+
+    def close(self) -> None:
+        """Take the checks away again."""
+        for name in _CHECKS:
+            self._diagnostics.remove(name)
+
+    def _walk(self) -> Finding:
+        report = self._stream.report
+        if report is None:
+            return Finding(Level.OK, "nothing is streamed yet")
+        text = str(report)
+        values = {"state": report.state, "speed": report.speed, "target_speed": report.target_speed}
+        if report.state == Motion.EMERGENCY_STOP.value:
+            return Finding(Level.ERROR, text, values)
+        if self._speeds.watch.stale:
+            silence = f"no speed on ~/cmd_vel for {self._speeds.watch.timeout:g} s, send speeds again"
+            return Finding(Level.WARN, f"{silence}; {text}", values)
+        return Finding(Level.OK, text, values)
+
+    def _timing(self) -> Finding:
+        punctuality = self._stream.punctuality()
+        if punctuality is None:
+            return Finding(Level.OK, "nothing is streamed yet")
+        values: dict[str, object] = {"rate": punctuality.rate}
+        for name, three in (("lateness", punctuality.lateness), ("jitter", punctuality.jitter)):
+            for kind, value in zip(("median", "99_percent", "max"), three, strict=True):
+                values[f"{name}_{kind}_ms"] = value * _MILLISECONDS
+        values |= {"missed_last_second": punctuality.missed, "missed": self._stream.missed}
+        if punctuality.missed:
+            text = (
+                f"{punctuality.missed} references of the last second were missed: lower `rate`, or give the "
+            )
+            return Finding(Level.WARN, text + "node a core that does nothing else", values)
+        return Finding(Level.OK, f"{punctuality.rate:.1f} Hz, none missed", values)
+
+    def _recording(self) -> Finding:
+        recorder = self._bag.recorder
+        if recorder is None:
+            return Finding(Level.OK, "not recording")
+        status = recorder.status()
+        values = _recording_values(status)
+        if status.error is not None:
+            return Finding(Level.ERROR, f"recording has ended: {status.error}", values)
+        if status.dropped:
+            text = f"{status.dropped} messages are not in the bag: the disk is too slow"
+            return Finding(Level.WARN, text, values)
+        return Finding(Level.OK, f"recording to {status.directory}", values)
+
+
+def _recording_values(status: RecorderStatus) -> dict[str, object]:
+    values: dict[str, object] = {
+        "directory": status.directory,
+        "messages": status.messages,
+        "dropped": status.dropped,
+        "size_mb": status.size_bytes / _MEGABYTE,
+    }
+    if status.directory.is_dir():
+        values["free_mb"] = free_bytes(status.directory) / _MEGABYTE
+    return values
