@@ -27,8 +27,9 @@ _SHAFT, _HEAD, _HEAD_LENGTH = 0.02, 0.045, 0.06
 _TEXT_HEIGHT = 0.06
 _GROUND_WIDTH = 0.6
 _TORQUE_WIDTH = 0.012
+_FORCE_LABEL_AHEAD = 0.2
 # Torques of the left leg are written behind it, those of the right leg ahead.
-_LABEL_AHEAD = (-0.22, 0.22)
+_LABEL_AHEAD = (-0.27, 0.27)
 # Arcs lie this much further outside than the legs [-].
 _BESIDE_LEG = 1.3
 # A smaller force is none, [N].
@@ -92,7 +93,8 @@ class SceneMarkers:
         tip = foot + scale * force
         arrow.points = [_point(point[0], self._sideways[side], point[1]) for point in (foot, tip)]
         arrow.scale = Vector3(x=_SHAFT, y=_HEAD, z=_HEAD_LENGTH)
-        label.pose.position = _point(tip[0], self._sideways[side], tip[1] + _TEXT_HEIGHT)
+        middle = foot + 0.4 * scale * force
+        label.pose.position = _point(middle[0] + _FORCE_LABEL_AHEAD, self._sideways[side], middle[1])
         label.scale.z = _TEXT_HEIGHT
         label.text = f"{size:.0f} N"
         return [arrow, label]
@@ -127,7 +129,7 @@ class SceneMarkers:
         for metre, height in zip(metres, heights, strict=True):
             lines.points += [_point(metre, -half, height), _point(metre, half, height)]
             # Few numbers are in use, so that a new metre takes the marker of one that is out of sight.
-            label = self._marker("ground_metres", 1 + metre % 4, Marker.TEXT_VIEW_FACING, _TEXT_COLOUR)
+            label = self._marker("ground_metres", 1 + metre % 5, Marker.TEXT_VIEW_FACING, _TEXT_COLOUR)
             label.pose.position = _point(metre, -half, height - _TEXT_HEIGHT)
             label.scale.z = _TEXT_HEIGHT
             label.text = f"{metre} m"

@@ -62,8 +62,8 @@ SETTINGS = [
         "Whether the transforms of the links are published; false beside robot_state_publisher.",
     ),
     Setting("force_scale", 0.0008, "Length of the arrows of ground reactions [m/N].", 1e-6, 1.0),
-    Setting("torque_scale", 0.1, "Angle of the arcs of joint torques [rad/(N m)].", 1e-6, 100.0),
-    Setting("trail_duration", 4.0, "How long the paths of the feet are kept [s].", 0.1, 60.0),
+    Setting("torque_scale", 0.3, "Angle of the arcs of joint torques [rad/(N m)].", 1e-6, 100.0),
+    Setting("trail_duration", 3.0, "How long the paths of the feet are kept [s].", 0.1, 60.0),
 ]
 
 

@@ -11,7 +11,7 @@ from walk_optimizer.scene.gait import ShownGait
 FloatArray = NDArray[np.float64]
 
 # The ground is shown so far before and behind the walker, [m].
-_REACH = 1.5
+_REACH = 2.0
 # Points for each metre where the ground is not straight.
 _DENSITY = 40
 

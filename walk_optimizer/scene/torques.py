@@ -11,8 +11,8 @@ from walk_optimizer.scene.tracking import WalkerPose
 
 FloatArray = NDArray[np.float64]
 
-_RADIUS = 0.09
-_HEAD_LENGTH = 0.03
+_RADIUS = 0.13
+_HEAD_LENGTH = 0.04
 # The sides of an arrow's head are turned so far from its shaft, [rad].
 _HEAD_ANGLE = 0.45
 _POINTS = 16
