@@ -26,11 +26,12 @@ LAYERS = (
     ("search", "optimizer", "refinement", "table_builder"),
     ("transition",),
     ("gait_files", "gait_csv"),
-    ("library_entries", "library", "verification", "report_table"),
+    ("interpolation", "library_entries", "library_selection", "library", "verification", "report_table"),
     ("profile", "references", "reference_check", "background"),
     ("joint_limits", "phase_clock", "walk", "blending", "command_watch", "tick_statistics"),
     ("description", "scene"),
     ("figures", "reproduction"),
+    ("examples",),
     ("recording",),
     ("nodes", "cli"),
 )

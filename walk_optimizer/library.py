@@ -1,24 +1,30 @@
 """The gait library: the packaged table and a user's cache, in memory and on disk.
 
-Owns which file answers a request and what happens to files that can't be used. Does not own the
-bytes of a file (`gait_files`) and solves nothing.
+Owns what happens to files that can't be used. Does not own which gait answers a request
+(`library_selection`) nor the bytes of a file (`gait_files`), and solves nothing.
 """
 
-import math
 import os
-from enum import StrEnum
 from pathlib import Path
 
-from walk_optimizer.errors import GaitFileError, GaitNotFoundError, InvalidRequestError
+from walk_optimizer.errors import GaitFileError, GaitNotFoundError
 from walk_optimizer.gait import Gait
 from walk_optimizer.gait_files import SUFFIX, gait_file_name, read_gait_file, write_gait_file
 from walk_optimizer.gait_files.access import writable_folder
 from walk_optimizer.library_entries import GaitSummary, LibraryEntry, Source, summarize, table_order
+from walk_optimizer.library_selection import (
+    EXACT_SPEED_TOLERANCE,
+    Query,
+    Selection,
+    parse_selection,
+    select,
+)
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
-from walk_optimizer.request import KMH_PER_MS, TABLE_SPEED_TOLERANCE, GaitRequest, gait_table_settings
+from walk_optimizer.request import TABLE_SPEED_TOLERANCE
 from walk_optimizer.resources import data_folder
 
 __all__ = [
+    "EXACT_SPEED_TOLERANCE",
     "GaitLibrary",
     "GaitSummary",
     "LibraryEntry",
@@ -27,13 +33,6 @@ __all__ = [
     "cache_folder",
     "table_folder",
 ]
-
-
-class Selection(StrEnum):
-    """Which gait answers a request for a speed."""
-
-    EXACT = "exact"
-    NEAREST = "nearest"
 
 
 def table_folder() -> Path:
@@ -110,33 +109,29 @@ class GaitLibrary:
         mode: SpringMode | str,
         selection: Selection | str = Selection.EXACT,
         points: int | None = None,
+        tolerance: float = TABLE_SPEED_TOLERANCE,
     ) -> tuple[Gait, Source]:
         """Return the gait for a speed and where it comes from.
-
-        Of several gaits within `TABLE_SPEED_TOLERANCE` of each other, those with the default number
-        of points go first, then the one closest in speed, then the one of least F.
 
         Args:
             speed: In [m/s].
             mode: A spring mode or its name.
-            selection: `exact` takes a gait within `TABLE_SPEED_TOLERANCE`, `nearest` the closest.
+            selection: How the gait is chosen, see Selection.
             points: Only gaits with this N; None takes any.
+            tolerance: Largest difference of an exact speed in [m/s]; by default speeds in km/h may be
+                written with two decimals, as the report does.
 
         Raises:
             InvalidRequestError: the speed is not finite, or the mode or selection unknown.
-            GaitNotFoundError: there is no such gait; the message lists the speeds that there are.
+            GaitNotFoundError: there is no such gait; the message lists the speeds that there are, and
+                says why there is no blend.
         """
-        mode, choice = SpringMode.parse(mode), _parse_selection(selection)
-        if not math.isfinite(speed):
-            raise InvalidRequestError(f"speed is {speed} m/s, expected a finite number")
-        entries = [entry for entry in self._entries if _fits(entry.gait.request, mode, points)]
-        least = min((_distance(entry, speed) for entry in entries), default=math.inf)
-        if not entries or (choice is Selection.EXACT and least > TABLE_SPEED_TOLERANCE):
-            raise GaitNotFoundError(self._not_found(speed, mode, entries))
-        reach = TABLE_SPEED_TOLERANCE if choice is Selection.EXACT else least + TABLE_SPEED_TOLERANCE
-        within = [entry for entry in entries if _distance(entry, speed) <= reach]
-        best = min(within, key=lambda entry: _preference(entry, speed))
-        return best.gait, best.source
+        query = Query(speed, SpringMode.parse(mode), parse_selection(selection), points, tolerance)
+        try:
+            return select(self._entries, query)
+        except GaitNotFoundError as error:
+            set_aside = f"; files set aside: {'; '.join(self._problems)}" if self._problems else ""
+            raise GaitNotFoundError(f"{error}{set_aside}") from error
 
     def store(self, gait: Gait) -> Path:
         """Write a gait into the folder and serve it from now on.
@@ -161,15 +156,6 @@ class GaitLibrary:
         self._entries = tuple(sorted(entries.values(), key=table_order))
         self._problems = tuple(text for text in self._problems if not text.startswith(f"{path}:"))
         return path
-
-    def _not_found(self, speed: float, mode: SpringMode, entries: list[LibraryEntry]) -> str:
-        speeds = sorted({entry.gait.request.speed for entry in entries})
-        listed = ", ".join(f"{one:.4f} ({one * KMH_PER_MS:.2f} km/h)" for one in speeds) or "none"
-        set_aside = f"; files set aside: {'; '.join(self._problems)}" if self._problems else ""
-        return (
-            f"no gait of {speed:.4f} m/s ({speed * KMH_PER_MS:.2f} km/h) with springs {mode.value}; "
-            f"speeds in [m/s] of that mode in the library: {listed}{set_aside}"
-        )
 
 
 def _gait_files(walker: WalkerParameters, folder: Path) -> list[tuple[Path, Source]]:
@@ -198,30 +184,3 @@ def _keep_better(entries: dict[str, LibraryEntry], entry: LibraryEntry) -> None:
     other = entries.get(entry.path.name)
     if other is None or entry.gait.objective <= other.gait.objective:
         entries[entry.path.name] = entry
-
-
-def _parse_selection(name: Selection | str) -> Selection:
-    """Return the selection of that name; an empty one means exact."""
-    try:
-        return Selection(name or Selection.EXACT)
-    except ValueError:
-        allowed = ", ".join(entry.value for entry in Selection)
-        raise InvalidRequestError(f"unknown selection {name!r}; allowed are {allowed}") from None
-
-
-def _distance(entry: LibraryEntry, speed: float) -> float:
-    """Return how far the requested speed of a gait is from a speed, in [m/s]."""
-    return abs(entry.gait.request.speed - speed)
-
-
-def _fits(request: GaitRequest, mode: SpringMode, points: int | None) -> bool:
-    """Return whether a gait is of the mode and, where one is asked for, of the number of points."""
-    return request.spring_mode is mode and points in (None, request.points)
-
-
-def _preference(entry: LibraryEntry, speed: float) -> tuple[bool, float, float]:
-    """Return the key by which the smallest is the best answer to a request for a speed."""
-    request = entry.gait.request
-    # A gait on a coarse grid that lies closer by less than the tolerance is no better answer.
-    other_grid = request.points != gait_table_settings().points
-    return other_grid, round(_distance(entry, speed), 6), entry.gait.objective

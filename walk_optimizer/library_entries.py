@@ -11,10 +11,11 @@ from walk_optimizer.model.parameters import SpringMode
 
 
 class Source(StrEnum):
-    """Where a gait of the library comes from."""
+    """Where a gait of the library comes from: a file of two places, or blended from two of them."""
 
     TABLE = "table"
     CACHE = "cache"
+    INTERPOLATED = "interpolated"
 
 
 @dataclass(frozen=True, eq=False)

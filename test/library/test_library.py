@@ -79,7 +79,7 @@ def test_nearest_takes_the_closest_speed_of_the_mode(table, folder):
         (math.nan, "none", "exact", "speed is nan m/s, expected a finite number"),
         (math.inf, "none", "nearest", "speed is inf m/s"),
         (0.3, "rubber", "exact", "unknown spring mode 'rubber'; allowed are none, stiffness"),
-        (0.3, "none", "best", "unknown selection 'best'; allowed are exact, nearest"),
+        (0.3, "none", "best", "unknown selection 'best'; allowed are exact, interpolated, nearest"),
     ],
 )
 def test_a_bad_question_is_refused(table, folder, speed, mode, selection, message):
