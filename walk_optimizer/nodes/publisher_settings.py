@@ -98,6 +98,12 @@ SETTINGS = [
         check=_one_of(INTERFACES),
     ),
     Setting(
+        "trajectory_effort",
+        True,
+        "Whether ~/joint_trajectory holds feed-forward torques; joint_trajectory_controller refuses them "
+        "unless it has an effort command interface.",
+    ),
+    Setting(
         "torque_order",
         list(TORQUES),
         "Order of ~/feedforward_torques: u1 hip (on the left, its opposite on the right), u2 left knee, "

@@ -131,7 +131,9 @@ class ReferencePublisherNode(ManagedNode):
             raise GaitNotFoundError("no gait is streamed yet; call set_gait first")
         rate = request.rate if request.rate != 0 else self.parameters["rate"]
         response.trajectory = cycle_to_message(
-            sample_cycle(gait.profile, rate), self.parameters["joint_names"]
+            sample_cycle(gait.profile, rate),
+            self.parameters["joint_names"],
+            self.parameters["trajectory_effort"],
         )
 
     def _keep_limits_met(self, changes: list[Parameter]) -> SetParametersResult:
