@@ -31,6 +31,7 @@ __all__ = [
     "Selection",
     "Source",
     "cache_folder",
+    "parse_selection",
     "table_folder",
 ]
 

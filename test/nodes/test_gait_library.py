@@ -59,9 +59,10 @@ def test_refusals_say_what_the_core_says_and_the_node_lives_on(graph, start, sto
         answer = graph.call(GetGait, GET, **fields)
         assert (answer.success, answer.message) == (False, str(refusal.value))
     answer = graph.call(GetGait, GET, speed=SLOW, spring_mode=MODE, selection="fastest")
-    assert (answer.success, "exact, nearest" in answer.message) == (False, True)
+    assert (answer.success, "exact, interpolated, nearest" in answer.message) == (False, True)
     absent = graph.call(GetGait, GET, speed=SLOW, spring_mode="none")
     assert not absent.success
+    assert "no gait of 0.3185 m/s (1.15 km/h) with springs none" in absent.message
     assert "gait_optimizer/optimize_gait is not there" in absent.message
     assert node.exit_code is None
 

@@ -9,8 +9,9 @@ from walk_optimizer_interfaces.srv import GetGait, ListGaits, OptimizeGait, Rebu
 
 from walk_optimizer.errors import GaitNotFoundError, SolveFailedError, WalkOptimizerError
 from walk_optimizer.gait import Gait
-from walk_optimizer.library import GaitLibrary, Selection, Source
+from walk_optimizer.library import EXACT_SPEED_TOLERANCE, GaitLibrary, Selection, Source, parse_selection
 from walk_optimizer.model.parameters import SpringMode
+from walk_optimizer.nodes.blends import Blends
 from walk_optimizer.nodes.conversions import gait_from_message, gait_to_message, summary_to_message
 from walk_optimizer.nodes.diagnostics import Finding, Level
 from walk_optimizer.nodes.lifecycle import ManagedNode
@@ -18,6 +19,7 @@ from walk_optimizer.nodes.log_text import with_fields
 from walk_optimizer.nodes.parameters import Setting
 from walk_optimizer.nodes.qos import LATCHED
 from walk_optimizer.nodes.running import run_node
+from walk_optimizer.nodes.suite_node import ServiceUnavailableError
 from walk_optimizer.nodes.walker_setting import WALKER_FILE, walker_of
 from walk_optimizer.request import GaitRequest, gait_table_settings
 
@@ -59,6 +61,7 @@ class GaitLibraryNode(ManagedNode):
     def __init__(self) -> None:
         """Declare the parameters; `configure` does the rest."""
         super().__init__("gait_library", SETTINGS)
+        self._blends = Blends(lambda wanted: self._found(wanted, Selection.INTERPOLATED))
 
     def configure(self) -> None:
         """Load the library and offer it.
@@ -71,6 +74,7 @@ class GaitLibraryNode(ManagedNode):
         self._library = GaitLibrary(walker, Path(folder) if folder else None, writable=True)
         for problem in self._library.problems():
             self.get_logger().warning(f"gait file set aside: {problem}")
+        self._blends.forget()
         self._optimizer = self.connect(OptimizeGait, self.parameters["optimizer_service"])
         self._table = self.create_publisher(GaitTable, "~/table", LATCHED)
         self.serve(GetGait, "~/get_gait", self._get)
@@ -84,30 +88,64 @@ class GaitLibraryNode(ManagedNode):
         self._publish_table()
         self.get_logger().info(with_fields("ready", gaits=len(self._library.gaits())))
 
+    def deactivate(self) -> None:
+        """Give up what is being blended."""
+        self._blends.give_up()
+
     def cleanup(self) -> None:
         """Say nothing more about the library; `configure` reads it anew."""
         self.diagnostics.remove("gaits")
         self.diagnostics.remove("optimizer")
 
+    def close(self) -> None:
+        """Shut down."""
+        super().close()
+        self._blends.close()
+
     async def _get(self, request: GetGait.Request, response: GetGait.Response) -> None:
         wanted = self._wanted(request.speed, request.spring_mode)
-        gait, response.source = await self._find(wanted, request.selection)
+        gait, response.source, how = await self._find(wanted, parse_selection(request.selection))
         response.gait = gait_to_message(gait)
-        response.message = f"{gait.speed:.4f} m/s from the {response.source}"
+        if response.source == Source.INTERPOLATED:
+            response.gait.method = response.source
+        response.message = f"{wanted.speed:.4f} m/s asked for, {gait.speed:.4f} m/s delivered: {how}"
 
     def _wanted(self, speed: float, mode: str) -> GaitRequest:
         return GaitRequest.for_speed(speed, mode, self.parameters["points"])
 
-    async def _find(self, wanted: GaitRequest, selection: str) -> tuple[Gait, str]:
-        """Return a gait and its source, solved now when the library lacks it."""
+    async def _find(self, wanted: GaitRequest, selection: Selection) -> tuple[Gait, str, str]:
+        """Return a gait, its source, and a sentence about that; solved now when the library lacks it."""
         try:
-            gait, source = self._library.find(wanted.speed, wanted.spring_mode, selection)
-        except GaitNotFoundError:
-            if selection == Selection.NEAREST:
+            gait, source = await self._look_up(wanted, selection)
+        except GaitNotFoundError as error:
+            if selection is Selection.NEAREST:
                 raise
-            self.get_logger().info(f"asking the optimizer for {wanted.speed:.4f} m/s, {wanted.spring_mode}")
-            return await self._solve(wanted), OPTIMIZER
-        return gait, source.value
+            self.get_logger().info(
+                with_fields("asking the optimizer", speed=wanted.speed, spring_mode=wanted.spring_mode)
+            )
+            try:
+                return await self._solve(wanted), OPTIMIZER, f"solved now; {error}"
+            except ServiceUnavailableError as away:
+                raise ServiceUnavailableError(f"{error}; {away}") from away
+        blended = source is Source.INTERPOLATED
+        return gait, source.value, gait.report.message if blended else f"from the {source.value}"
+
+    async def _look_up(self, wanted: GaitRequest, selection: Selection) -> tuple[Gait, Source]:
+        """Return what the library has without the optimizer.
+
+        Raises:
+            GaitNotFoundError: nothing that fits.
+        """
+        if selection is not Selection.INTERPOLATED:
+            return self._found(wanted, selection)
+        blend = self._blends.find(wanted)
+        await self.finished(blend)
+        return blend.result()
+
+    def _found(self, wanted: GaitRequest, selection: Selection) -> tuple[Gait, Source]:
+        return self._library.find(
+            wanted.speed, wanted.spring_mode, selection, tolerance=EXACT_SPEED_TOLERANCE
+        )
 
     async def _solve(self, wanted: GaitRequest) -> Gait:
         """Have a gait solved, and store it.
@@ -123,6 +161,7 @@ class GaitLibraryNode(ManagedNode):
             raise SolveFailedError(answer.message)
         gait = gait_from_message(answer.gait, answer.report, self._library.walker, wanted)
         self._library.store(gait)
+        self._blends.forget()
         self._publish_table()
         return gait
 
