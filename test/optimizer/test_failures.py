@@ -135,7 +135,7 @@ def test_a_failure_of_the_solver_is_told_in_its_own_words(walker, monkeypatch):
     def failing(problem, start, options, monitor):
         return Solution(Status.SOLVER_ERROR, start, 0.0, 0.0, 0, "Internal_Error")
 
-    monkeypatch.setattr(session_module.ipopt, "solve", failing)
+    monkeypatch.setattr("walk_optimizer.solve.ipopt.solve", failing)
     report = optimize(REQUEST, walker).report
     assert report.status is Status.SOLVER_ERROR
     assert "; it says Internal_Error; " in report.message

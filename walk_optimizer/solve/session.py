@@ -2,7 +2,8 @@
 
 import time
 
-from walk_optimizer.solve import ipopt
+from walk_optimizer.solve.back_end import SolveOptions
+from walk_optimizer.solve.registry import back_end
 from walk_optimizer.solve.settings import SolverSettings
 from walk_optimizer.solve.solution import FloatArray, IterationState, Solution
 from walk_optimizer.solve.status import Progress, ProgressCallback, Status
@@ -21,8 +22,12 @@ class SolveSession:
             settings: Of the solver.
             time_limit: Of all solves together in [s].
             progress: Told at each iteration; may cancel.
+
+        Raises:
+            MissingDependencyError: the library of the back end is not installed.
         """
         self._settings, self._time_limit, self._progress = settings, time_limit, progress
+        self._back_end = back_end(settings.back_end)
         self._begin = time.monotonic()
         self.verdict: Status | None = None
         self.iterations = 0
@@ -59,8 +64,8 @@ class SolveSession:
         def monitor(state: IterationState) -> Status | None:
             return self._watch(state, stage, objective_unit)
 
-        options = ipopt.IpoptOptions(self._settings.tolerance, self._settings.maximum_iterations, barrier)
-        solution = ipopt.solve(problem, start, options, monitor)
+        options = SolveOptions(self._settings.tolerance, self._settings.maximum_iterations, barrier)
+        solution = self._back_end.solve(problem, start, options, monitor)
         self.iterations += solution.iterations
         return solution
 

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.resources import config_file, require_positive, settings_from_yaml
-
-BACK_ENDS = ("ipopt",)
+from walk_optimizer.solve.registry import BACK_ENDS
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,8 @@ class SolverSettings:
     def __post_init__(self) -> None:
         """Refuse values that no solve can use."""
         if self.back_end not in BACK_ENDS:
-            raise ConfigurationError(f"unknown back_end {self.back_end!r}; known are {', '.join(BACK_ENDS)}")
+            known = ", ".join(f"{name} ({entry.method})" for name, entry in BACK_ENDS.items())
+            raise ConfigurationError(f"unknown back_end {self.back_end!r}; known are {known}")
         require_positive(self, "solver setting ")
 
     @classmethod

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.transcription.program import Nlp
+from walk_optimizer.transcription.program import Nlp, StageOrder
 from walk_optimizer.transcription.sparse import IntArray, gather, pattern, picked
 from walk_optimizer.transcription.stage import Ends, Stage, StageKind
 
@@ -52,6 +52,7 @@ def assemble(stages: Sequence[Stage], ends: Ends, shared_count: int, shared_rows
             ["triu_hess_gamma_x_x"],
         ),
         gradient=ca.Function("nlp_grad_f", [x, p], [cost, gradient], names, ["f", "grad_f_x"]),
+        stages=graph.stage_order(),
     )
 
 
@@ -118,6 +119,15 @@ class _Graph:
     def row_count(self) -> int:
         """Rows of the program."""
         return int(self.kept.size) + self.end_rows + int(self.shared_rows.shape[0])
+
+    def stage_order(self) -> StageOrder:
+        """Return the stage of each variable and row; the ends' rows belong to the last stage."""
+        count, kinds = np.arange(len(self.stages)), [one.kind for one in self.stages]
+        shared = np.full(self.x.numel() - self.shared_offset, -1)
+        own_rows = np.repeat(count, [kind.rows for kind in kinds])[self.kept]
+        ends, linear = np.full(self.end_rows, count[-1]), np.zeros(self.shared_rows.shape[0], dtype=int)
+        variables = np.concatenate([np.repeat(count, [kind.width for kind in kinds]), shared])
+        return StageOrder(variables, np.concatenate([own_rows, ends, linear]))
 
     def _ends(self, name: str, *extra: ca.MX) -> ca.MX:
         """Evaluate a function of the ends at the last state."""

@@ -7,6 +7,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class StageOrder:
+    """Which stage of a chain each variable and each row belongs to.
+
+    A row depends on variables of its own stage and of the one before it (the last one for those of the
+    first), and on shared variables.
+
+    Attributes:
+        variables: Stage of each variable, (n,); -1 for shared ones.
+        rows: Stage of each row, (m,).
+    """
+
+    variables: IntArray
+    rows: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,12 +35,14 @@ class Nlp:
         jacobian: (x, p) -> (g, dg/dx).
         hessian: (x, p, lam_f, lam_g) -> upper triangle of the Hessian of the Lagrangian.
         gradient: (x, p) -> (f, df/dx).
+        stages: Its structure, for solvers that make use of one; None where it has none.
     """
 
     expressions: dict[str, ca.MX]
     jacobian: ca.Function
     hessian: ca.Function
     gradient: ca.Function
+    stages: StageOrder | None = None
 
 
 @dataclass(frozen=True, eq=False)
