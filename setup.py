@@ -38,7 +38,7 @@ INTERFACES = [
 FIGURES = ["matplotlib>=3.8,<4"]
 
 # pin (Pinocchio) is an independent rigid-body library, rosbags an independent reader of bags, xacro what
-# the walker's macro file is for.
+# the walker's macro file is for, lxml reads security policies as SROS2 does.
 TEST = [
     "pytest>=8",
     "pytest-timeout>=2.3",
@@ -46,6 +46,7 @@ TEST = [
     "rosbags>=0.10",
     "pin>=3",
     "xacro>=2,<3",
+    "lxml>=5",
 ]
 
 LINT = ["ruff>=0.11", "mypy>=1.15", "types-PyYAML"]

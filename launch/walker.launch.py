@@ -10,6 +10,8 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 NODES = ("gait_optimizer", "gait_library", "reference_publisher")
+# Those of security/walk_optimizer.policy.xml.
+ENCLAVES = "/walk_optimizer"
 
 
 def shared_file(*names: str) -> PathJoinSubstitution:
@@ -30,7 +32,8 @@ def walker_node(name: str, condition: Condition | None = None) -> Node:
         name=name,
         namespace=LaunchConfiguration("namespace"),
         parameters=[shared_file("config", f"{name}.yaml"), use_sim_time()],
-        ros_arguments=["--log-level", LaunchConfiguration("log_level")],
+        # Without SROS2 an enclave is but a name.
+        ros_arguments=["--log-level", LaunchConfiguration("log_level"), "--enclave", f"{ENCLAVES}/{name}"],
         output="screen",
         condition=condition,
     )
@@ -44,6 +47,7 @@ def rviz_node() -> Node:
         name="rviz",
         namespace=LaunchConfiguration("namespace"),
         arguments=["-d", shared_file("rviz", "walker.rviz")],
+        ros_arguments=["--enclave", f"{ENCLAVES}/operator"],
         parameters=[use_sim_time()],
         remappings=[("/tf", "tf"), ("/tf_static", "tf_static")],
         condition=IfCondition(LaunchConfiguration("rviz")),

@@ -1,0 +1,156 @@
+"""Each node may do exactly what it does: the policies beside the graph of the running nodes."""
+
+import os
+
+import pytest
+
+pytest.importorskip("rclpy")
+pytest.importorskip("lxml")
+
+from lxml import etree
+from nodes.graph import PATIENCE
+from rclpy.action import get_action_server_names_and_types_by_node
+from security.policies import POLICY, RULES, load_policy, problems, profiles
+
+from walk_optimizer.cli.processes import NodeProcess
+
+NODES = ("gait_optimizer", "gait_library", "reference_publisher", "walker_visualizer")
+PARTS = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
+
+
+def test_the_policy_has_the_format_of_sros2():
+    root = load_policy().getroot()
+    assert problems(root) == []
+    assert root.get("version") == "0.2.0"
+    # sros2 takes every child of <enclaves> for an enclave, comments too.
+    assert all(isinstance(child.tag, str) for child in root.find("enclaves"))
+    qualifiers = {
+        value
+        for kind in RULES
+        for group in root.iter(kind)
+        for name, value in group.items()
+        if not name.endswith("base")
+    }
+    assert qualifiers == {"ALLOW"}
+
+
+def test_the_check_of_the_format_finds_what_is_wrong():
+    root = etree.fromstring(
+        "<policy version='0.2.0'><enclaves><enclave path='/a' kind='x'><profiles><profile ns='/' node='a'>"
+        "<topics publish='ALLOW'><service>a</service><topic> </topic></topics><topcis/></profile></profiles>"
+        "</enclave></enclaves></policy>"
+    )
+    assert problems(root) == [
+        "enclave: kind",
+        "service in topics",
+        "topic without a name",
+        "topcis in profile",
+        "unknown element topcis",
+    ]
+
+
+def test_the_policy_is_valid_by_the_schema_of_sros2():
+    policy = pytest.importorskip("sros2.policy", reason="needs the package sros2 of a ROS distribution")
+    assert policy.load_policy(POLICY) is not None
+
+
+def test_sros2_makes_signed_permissions_of_the_policy(tmp_path):
+    generation = pytest.importorskip("sros2.api._artifact_generation", reason="needs sros2")
+    generation.generate_artifacts(tmp_path, [], [POLICY])
+    made = {
+        f"/{path.parent.relative_to(tmp_path / 'enclaves')}" for path in tmp_path.rglob("permissions.p7s")
+    }
+    assert made == set(profiles())
+
+
+@pytest.fixture(scope="module")
+def nodes(start_for_module):
+    for name in NODES:
+        start_for_module(name, use_sim_time=True)
+
+
+def split_actions(names):
+    """Names without the parts of actions, and the actions that they are parts of."""
+    parts = {name for name in names if "/_action/" in name}
+    actions = {name.split("/_action/")[0] for name in parts}
+    assert all(name.split("/_action/")[1] in PARTS for name in parts)
+    return names - parts, actions
+
+
+def done_by(node, name):
+    """What a node does, as the graph tells: full names by what is done with them."""
+    asked = {
+        "publish": node.get_publisher_names_and_types_by_node,
+        "subscribe": node.get_subscriber_names_and_types_by_node,
+        "reply": node.get_service_names_and_types_by_node,
+        "request": node.get_client_names_and_types_by_node,
+    }
+    done = {}
+    for rule, ask in asked.items():
+        done[rule], _ = split_actions({topic for topic, _ in ask(name, "/")})
+    done["execute"] = {action for action, _ in get_action_server_names_and_types_by_node(node, name, "/")}
+    done["call"] = split_actions({topic for topic, _ in asked["request"](name, "/")})[1]
+    return done
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("name", NODES)
+def test_a_node_may_do_exactly_what_it_does(graph, nodes, name):
+    allowed = profiles()[f"/walk_optimizer/{name}"].allowed
+
+    def differences():
+        if (name, "/") not in graph.node.get_node_names_and_namespaces():
+            return {"node": "not there"}
+        done = done_by(graph.node, name)
+        return {
+            rule: {"not allowed": done[rule] - allowed[rule], "not done": allowed[rule] - done[rule]}
+            for rule in allowed
+            if done[rule] != allowed[rule]
+        }
+
+    try:
+        graph.spin_until(lambda: not differences(), f"the policy of {name}", patience=PATIENCE / 6)
+    except AssertionError:
+        assert differences() == {}
+
+
+# What the other side of a name does.
+OPPOSITE = {"publish": "subscribe", "subscribe": "publish", "request": "reply", "call": "execute"}
+COMMON = {"/clock", "/parameter_events", "/rosout", "/diagnostics"}
+
+
+@pytest.mark.parametrize("enclave", ["operator", "controller"])
+def test_people_and_controllers_may_do_only_what_a_node_is_there_for(enclave):
+    everybody = profiles()
+    own = everybody[f"/walk_optimizer/{enclave}"].allowed
+    suite = [everybody[f"/walk_optimizer/{name}"].allowed for name in NODES]
+    for rule, other in OPPOSITE.items():
+        offered = set().union(*(allowed[other] for allowed in suite))
+        assert own[rule] <= offered | COMMON
+    assert not own["reply"]
+    assert not own["execute"]
+
+
+def test_nobody_but_the_publisher_publishes_references():
+    for enclave, profile in profiles().items():
+        publishes = {name for name in profile.allowed["publish"] if name.startswith("/reference_publisher/")}
+        if enclave == "/walk_optimizer/operator":
+            assert publishes == {"/reference_publisher/cmd_vel", "/reference_publisher/target_speed"}
+        elif enclave != "/walk_optimizer/reference_publisher":
+            assert not publishes
+
+
+@pytest.mark.ros
+def test_a_node_that_must_be_secure_does_not_start_without_its_keys(isolated_graph, tmp_path):
+    environment = os.environ | {
+        "ROS_SECURITY_ENABLE": "true",
+        "ROS_SECURITY_STRATEGY": "Enforce",
+        "ROS_SECURITY_KEYSTORE": str(tmp_path),
+    }
+    enclave = ["--enclave", "/walk_optimizer/walker_visualizer"]
+    node = NodeProcess("walker_visualizer", tmp_path / "log", enclave, environment)
+    try:
+        assert node.process.wait(PATIENCE) == 1
+    finally:
+        node.kill()
+    assert "can't start: failed to initialize rcl: SECURITY ERROR" in node.output()
