@@ -1,0 +1,254 @@
+"""What is timed, for the package and for the plain transcription; every function runs in a new process."""
+
+import os
+import tempfile
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from plain_refined import PlainRefined, phases_of
+from plain_transcription import FixedSchedule, PlainSolution, kinematic_points, search, with_free_contacts
+
+from walk_optimizer.certificate import certify
+from walk_optimizer.gait import Certificate, Gait, RefinedGait, Trajectory
+from walk_optimizer.library import GaitLibrary
+from walk_optimizer.mechanics import foot_arm
+from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
+from walk_optimizer.optimizer import optimize
+from walk_optimizer.refined_certificate import certify_refined
+from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.request import GaitRequest
+from walk_optimizer.search import Search
+from walk_optimizer.solve.session import SolveSession
+from walk_optimizer.solve.settings import solver_settings
+from walk_optimizer.starts import kinematic_starts
+from walk_optimizer.transcription.tableau import NODES_WITH_START
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Score:
+    """One solve, judged by the package's certificate.
+
+    Attributes:
+        seconds: Wall time.
+        processor: Processor time, that of child processes included.
+        objective: F in [(N m)^2], or the integral of 1/2 |u|^2 dt in [(N m)^2 s] of a refined gait.
+        status: How it ended, in the solver's words.
+        residual: Largest residual in units of its tolerance; certified if at most 1.
+        family: The family of constraints that it belongs to.
+        iterations: Of all solves together.
+        again: Wall time of the same solve in the same process, where nothing is built anew.
+    """
+
+    seconds: float
+    processor: float
+    objective: float
+    status: str
+    residual: float
+    family: str
+    iterations: int = 0
+    again: float = float("nan")
+
+    @property
+    def certified(self) -> bool:
+        """Whether every residual is within its tolerance."""
+        return self.residual <= 1.0
+
+
+def walker() -> WalkerParameters:
+    return WalkerParameters.from_yaml()
+
+
+def library_gait(request: GaitRequest) -> Gait:
+    """Return the gait of the packaged table for a request."""
+    with tempfile.TemporaryDirectory() as empty:
+        library = GaitLibrary(walker(), Path(empty).resolve())  # the packaged table alone
+        return library.find(request.speed, request.spring_mode)[0]
+
+
+class Clock:
+    """Wall and processor time since it was made."""
+
+    def __init__(self) -> None:
+        self._wall, self._processor = time.perf_counter(), sum(os.times()[:4])
+
+    def read(self) -> tuple[float, float]:
+        """Return wall time and processor time in [s]."""
+        return time.perf_counter() - self._wall, sum(os.times()[:4]) - self._processor
+
+
+def score_points(
+    times: tuple[float, float],
+    request: GaitRequest,
+    points: FloatArray,
+    spring: KneeSpring,
+    status: str,
+    iterations: int,
+) -> Score:
+    """Judge points (23, N) in SI units on the report's grid."""
+    trajectory = Trajectory.from_stacked(points, request.step_time)
+    worst = certify(walker(), request, spring, trajectory).worst
+    return Score(*times, trajectory.torque_cost, status, worst.relative, worst.family, iterations)
+
+
+def _score_refined(
+    times: tuple[float, float],
+    request: GaitRequest,
+    trajectory: RefinedTrajectory,
+    spring: KneeSpring,
+    status: str,
+) -> Score:
+    length = float(foot_arm(walker(), trajectory.states[-1, -1][:6, None], 1).position[0, 0])
+    gait = RefinedGait(trajectory, spring, length, Certificate(()))
+    worst = certify_refined(walker(), request, gait).worst
+    return Score(*times, trajectory.torque_effort, status, worst.relative, worst.family)
+
+
+def ours_one_start(request: GaitRequest, free_contacts: bool) -> Score:
+    """Solve from the first kinematic start on the full grid, and then with free contacts."""
+    settings = solver_settings()
+    clock = Clock()
+    session = SolveSession(settings, settings.time_limit, None)
+    one = Search(request, walker(), session, settings.relaxation)
+    found = one.from_start(kinematic_starts(walker(), request.spring_mode)[0], request.points)
+    if free_contacts:
+        found = one.with_free_contacts(found)
+    times, status = clock.read(), found.status.value
+    return score_points(times, request, found.points, found.spring, status, session.iterations)
+
+
+def plain_one_start(request: GaitRequest, free_contacts: bool) -> Score:
+    """Do the same in the plain transcription."""
+    start = kinematic_starts(walker(), request.spring_mode)[0]
+    clock = Clock()
+    found = FixedSchedule(request, walker()).solve(kinematic_points(request, walker(), start))
+    if free_contacts:
+        found = with_free_contacts(request, walker(), found)
+    return _score_plain(clock, request, found)
+
+
+def ours_search(request: GaitRequest, refine: bool = False) -> Score:
+    """Solve a request as a user does."""
+    clock = Clock()
+    outcome = optimize(request, walker(), refine=refine)
+    times, gait, report = clock.read(), outcome.gait, outcome.report
+    if gait is None:
+        raise RuntimeError(report.message)
+    points = gait.trajectory.stacked()
+    return score_points(times, request, points, gait.spring, report.status.value, report.iterations)
+
+
+def ours_search_without_cache(request: GaitRequest) -> Score:
+    """Solve a request where nothing has been compiled before."""
+    with tempfile.TemporaryDirectory() as empty:
+        os.environ["XDG_CACHE_HOME"] = empty
+        return ours_search(request)
+
+
+def plain_search(request: GaitRequest) -> tuple[Score, PlainSolution]:
+    """Try the package's starts in the plain transcription."""
+    starts = kinematic_starts(walker(), request.spring_mode)
+    clock = Clock()
+    found = search(request, walker(), starts)
+    if found is None:
+        raise RuntimeError("no start converged")
+    return _score_plain(clock, request, found), found
+
+
+def _score_plain(clock: Clock, request: GaitRequest, found: PlainSolution) -> Score:
+    times = clock.read()
+    return score_points(times, request, found.points, found.spring, found.status, found.iterations)
+
+
+def plain_refinement(request: GaitRequest, found: PlainSolution) -> Score:
+    """Refine a plain gait on the phases and the mesh that the package found for its own."""
+    model = library_gait(request).refined
+    if model is None:
+        raise RuntimeError("the table's gait has no refinement to take the mesh from")
+    clock = Clock()
+    problem = PlainRefined(request.spring_mode, walker(), phases_of(model.trajectory))
+    start = replace(model, trajectory=_on_mesh(model.trajectory, request, found), spring=found.spring)
+    solution = problem.solve(start, request.step_length, request.step_time)
+    return _score_refined(clock.read(), request, solution.trajectory, solution.spring, solution.status)
+
+
+def _on_mesh(mesh: RefinedTrajectory, request: GaitRequest, found: PlainSolution) -> RefinedTrajectory:
+    """Interpolate a solution of the Euler grid on a mesh."""
+    grid = np.arange(1, request.points + 1) * request.interval
+    nodes = mesh.breaks[:-1, None] + mesh.lengths[:, None] * NODES_WITH_START
+    net = found.points[[15, 17, 18, 20]] - np.vstack([found.points[16], 0 * grid, found.points[19], 0 * grid])
+    net[:, :2] = net[:, 2:3]  # the impulse of the impact, spread over the first interval
+
+    def at(rows: FloatArray, when: FloatArray) -> FloatArray:
+        return np.stack([np.interp(when, grid, row) for row in rows], axis=-1)
+
+    return replace(
+        mesh,
+        states=at(found.points[:12], nodes),
+        torques=at(found.points[12:15], nodes[:, 1:]),
+        forces=at(net, nodes[:, 1:]),
+        impulses=np.zeros_like(mesh.impulses),
+    )
+
+
+def ours_resolve(request: GaitRequest, neighbour: Gait) -> Score:
+    """Solve for a new speed from a gait of the library; `again` is what it takes in a process that runs."""
+    clock = Clock()
+    resolved(request, neighbour)
+    first, clock = clock.read(), Clock()
+    refined = resolved(request, neighbour)
+    again = clock.read()
+    score = _score_refined(first, request, refined.trajectory, refined.spring, "solved")
+    return replace(score, again=again[0])
+
+
+def resolved(request: GaitRequest, neighbour: Gait) -> RefinedGait:
+    """Return the refined gait that continues a neighbour: the one place that knows how it is asked for."""
+    outcome = optimize(request, neighbour.walker, seeds=(neighbour,), from_scratch=False)
+    if outcome.gait is None or outcome.gait.refined is None:
+        raise RuntimeError(outcome.report.message)
+    return outcome.gait.refined
+
+
+def plain_resolve(request: GaitRequest, neighbour: Gait) -> Score:
+    """Do the same in the plain transcription, on the neighbour's phases and mesh."""
+    if neighbour.refined is None:
+        raise RuntimeError("the neighbour has no refinement")
+    clock = Clock()
+    problem = PlainRefined(request.spring_mode, walker(), phases_of(neighbour.refined.trajectory))
+    problem.solve(neighbour.refined, request.step_length, request.step_time)
+    first, clock = clock.read(), Clock()
+    solution = problem.solve(neighbour.refined, request.step_length, request.step_time)
+    again = clock.read()
+    score = _score_refined(first, request, solution.trajectory, solution.spring, solution.status)
+    return replace(score, again=again[0], iterations=solution.iterations)
+
+
+def ours_growth(points: int) -> Score:
+    """Solve one fixed schedule of N points, twice."""
+    request = growth_request(points)
+    first = ours_one_start(request, False)
+    return replace(first, again=ours_one_start(request, False).seconds)
+
+
+def plain_growth(points: int) -> Score:
+    """Do the same in the plain transcription."""
+    request = growth_request(points)
+    start = kinematic_points(request, walker(), kinematic_starts(walker(), request.spring_mode)[0])
+    clock = Clock()
+    problem = FixedSchedule(request, walker())
+    found = problem.solve(start)
+    first, clock = clock.read(), Clock()
+    problem.solve(start)
+    again = clock.read()
+    score = score_points(first, request, found.points, found.spring, found.status, found.iterations)
+    return replace(score, again=again[0])
+
+
+def growth_request(points: int) -> GaitRequest:
+    """Return the request whose cost is measured against N: 1.92 km/h, no springs."""
+    return GaitRequest.for_step(0.35, 0.655, SpringMode.NONE, points)
