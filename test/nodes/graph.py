@@ -53,6 +53,14 @@ class Graph:
             self.spin_for(SETTLING)
         return self._clients[name]
 
+    def offered(self, node, name):
+        """Return whether a node without a namespace offers a service of that full name."""
+        return any(name == one for one, _ in self.node.get_service_names_and_types_by_node(node, "/"))
+
+    def forget(self, name):
+        """Make the client of a service anew when it is used again."""
+        self.node.destroy_client(self._clients.pop(name))
+
     def send(self, kind, name, **fields):
         """Return the future of a response."""
         return self.client(kind, name).call_async(kind.Request(**fields))
