@@ -1,4 +1,4 @@
-"""Where the files that ship beside the code are found, and how YAML is read."""
+"""Where the files that ship beside the code are found, how YAML is read, and when a disk has a file."""
 
 import math
 import os
@@ -117,3 +117,12 @@ def text_hint(value: Any) -> str:
     if math.isnan(number):
         return ""
     return "; YAML takes it for a text: write numbers without quotes, and 1e-8 as 1.0e-8"
+
+
+def sync_directory(directory: Path) -> None:
+    """Wait until the disk knows the names in a directory."""
+    descriptor = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

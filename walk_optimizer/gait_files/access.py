@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 from walk_optimizer.errors import GaitFileError
+from walk_optimizer.resources import sync_directory
 
 
 def read_limited(path: Path, largest: int) -> bytes:
@@ -51,7 +52,7 @@ def replace_file(path: Path, data: bytes) -> None:
             os.fchmod(stream.fileno(), 0o644)
             os.fsync(stream.fileno())
         draft.replace(path)
-        _sync_folder(path.parent)
+        sync_directory(path.parent)
     except OSError as error:
         raise GaitFileError(f"{path}: can't be written: {error.strerror}") from error
     finally:
@@ -109,12 +110,3 @@ def write_text(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise GaitFileError(f"{path}: can't be written: {error.strerror}") from error
-
-
-def _sync_folder(folder: Path) -> None:
-    """Wait until the disk knows the names in a folder."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 from walk_optimizer.recording.errors import BagNotWritableError, DiskFullError, RecordingError
+from walk_optimizer.resources import sync_directory
 
 # Full disk, used-up quota, and the size limit of a file: for a recording all the same.
 _FULL_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
@@ -88,15 +89,6 @@ def replace_text(path: Path, text: str) -> None:
             draft.unlink()
         raise
     sync_directory(path.parent)
-
-
-def sync_directory(directory: Path) -> None:
-    """Wait until the disk knows the names in a directory."""
-    descriptor = os.open(directory, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def free_bytes(directory: Path) -> int:

@@ -10,13 +10,14 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import DataEnd, Footer
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
-from walk_optimizer.recording.disk import RecordFile, sync_directory, write_error
+from walk_optimizer.recording.disk import RecordFile, write_error
 from walk_optimizer.recording.errors import RecordingError
 from walk_optimizer.recording.framing import MAGIC
 from walk_optimizer.recording.metadata import FileEntry
 from walk_optimizer.recording.scan import METADATA_KEY, METADATA_RECORD
 from walk_optimizer.recording.settings import Compression, RecorderSettings
 from walk_optimizer.recording.topics import TopicInfo, qos_to_yaml
+from walk_optimizer.resources import sync_directory
 
 PROFILE = "ros2"
 LIBRARY = f"walk_optimizer, {LIBRARY_IDENTIFIER}"
