@@ -18,17 +18,15 @@ _KINEMATIC_TOLERANCE = 1e-6
 _BOUND_TOLERANCE = 1e-6
 
 
-def _state_before(q: FloatArray, p: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return coordinates and momenta at the points before each, the first relabelled from the last.
+def _relabelled(trajectory: Trajectory, step: FloatArray) -> FloatArray:
+    """Return the state (12,) before point 1 of a periodic walk: point N with the legs exchanged.
 
     Args:
-        q: Coordinates, (6, N).
-        p: Momenta, (6, N).
+        trajectory: One step.
         step: Length and rise of the step in [m], (2,).
     """
-    first_q, first_p = q[list(RELABELLED), -1], p[list(RELABELLED), -1]
-    first_q[:2] -= step
-    return np.column_stack([first_q, q[:, :-1]]), np.column_stack([first_p, p[:, :-1]])
+    q, p = trajectory.q[list(RELABELLED), -1], trajectory.p[list(RELABELLED), -1]
+    return np.concatenate([q[:2] - step, q[2:], p])
 
 
 def landing_distance(walker: WalkerParameters, trajectory: Trajectory) -> float:
@@ -37,13 +35,25 @@ def landing_distance(walker: WalkerParameters, trajectory: Trajectory) -> float:
 
 
 def _dynamics_defects(
-    walker: WalkerParameters, mechanics: Mechanics, trajectory: Trajectory, interval: float, step: FloatArray
+    walker: WalkerParameters,
+    mechanics: Mechanics,
+    trajectory: Trajectory,
+    interval: float,
+    before: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the defects of implicit Euler per unit of time: velocities (6, N) and forces (6, N)."""
-    q_before, p_before = _state_before(trajectory.q, trajectory.p, step)
+    """Return the defects of implicit Euler per unit of time: velocities (6, N) and forces (6, N).
+
+    Args:
+        walker: The walker.
+        mechanics: Its mechanics at the points.
+        trajectory: The motion.
+        interval: Time step h in [s].
+        before: The state before point 1, (12,).
+    """
+    states = np.vstack([trajectory.q, trajectory.p])
+    rates = np.diff(states, axis=1, prepend=before[:, None]) / interval
     reaction = horizontal_and_vertical(walker, trajectory.net_reaction())
-    rate = mechanics.momentum_rate(trajectory.u, reaction)
-    return (trajectory.q - q_before) / interval - mechanics.qdot, (trajectory.p - p_before) / interval - rate
+    return rates[:6] - mechanics.qdot, rates[6:] - mechanics.momentum_rate(trajectory.u, reaction)
 
 
 def _contact_entries(
@@ -137,7 +147,8 @@ def certify(
     mechanics = mechanics_at(walker, spring, trajectory.q, trajectory.p)
     step_length = landing_distance(walker, trajectory)
     step = np.array([step_length, walker.terrain.height(step_length, request.step_length)])
-    velocities, forces = _dynamics_defects(walker, mechanics, trajectory, request.interval, step)
+    before = _relabelled(trajectory, step)
+    velocities, forces = _dynamics_defects(walker, mechanics, trajectory, request.interval, before)
     force_tolerance = RELATIVE_TOLERANCE * walker.weight
     shortfall = request.speed - step_length / request.step_time
     motion, load = "m/s, rad/s", "N, N m"
@@ -153,6 +164,27 @@ def certify(
         *_contact_entries(walker, mechanics, trajectory, request.step_length),
         *_bound_entries(walker, trajectory),
         *spring_entries(walker, request.spring_mode, spring),
+    ]
+    return Certificate(tuple(entries))
+
+
+def certify_from(walker: WalkerParameters, start: FloatArray, trajectory: Trajectory) -> Certificate:
+    """Return the residuals of a motion on level ground, without springs, that begins in a given state.
+
+    Args:
+        walker: The walker.
+        start: The state before point 1, (12,).
+        trajectory: The motion on an even implicit Euler grid.
+    """
+    mechanics = mechanics_at(walker, KneeSpring(), trajectory.q, trajectory.p)
+    interval = float(trajectory.time[0])
+    velocities, forces = _dynamics_defects(walker, mechanics, trajectory, interval, start)
+    force_tolerance = RELATIVE_TOLERANCE * walker.weight
+    entries = [
+        CertificateEntry("kinematics", _excess(np.abs(velocities)), "m/s, rad/s", _KINEMATIC_TOLERANCE),
+        CertificateEntry("dynamics", _excess(np.abs(forces)), "N, N m", force_tolerance),
+        *_contact_entries(walker, mechanics, trajectory, 1.0),
+        *_bound_entries(walker, trajectory),
     ]
     return Certificate(tuple(entries))
 

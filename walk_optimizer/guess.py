@@ -50,11 +50,11 @@ def kinematic_guess(walker: WalkerParameters, request: GaitRequest, shape: Guess
     swing_x = stride * (2 * cycloid - 1)
     swing = np.array([swing_x, shape.clearance * walker.leg_length * np.sin(np.pi * phase) ** 2])
     hip, swing = turned @ hip, turned @ swing
-    q = np.vstack([hip, _leg_angles(walker, -hip), _leg_angles(walker, swing - hip)])
+    q = np.vstack([hip, leg_angles(walker, -hip), leg_angles(walker, swing - hip)])
     return _with_momenta(walker, request, q)
 
 
-def _leg_angles(walker: WalkerParameters, foot: FloatArray) -> FloatArray:
+def leg_angles(walker: WalkerParameters, foot: FloatArray) -> FloatArray:
     """Return upper-leg and knee angle, (2, M), that place the foot at (2, M) relative to the hip.
 
     The cosine rule gives the inner knee angle k; the knee points forward. Seen from the hip, the foot

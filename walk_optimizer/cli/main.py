@@ -18,7 +18,7 @@ from walk_optimizer.errors import WalkOptimizerError
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 130
 
-_VERBS = ("solve", "table", "library", "export", "picture", "reproduce", "urdf", "bag", "demo")
+_VERBS = ("solve", "table", "library", "export", "picture", "reproduce", "example", "urdf", "bag", "demo")
 
 _DESCRIPTION = """\
 Least-torque walking gaits for a planar biped with knee springs.

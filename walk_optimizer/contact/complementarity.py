@@ -40,6 +40,15 @@ class ContactPoint:
         )
         return a, ca.vertcat(self.normal, self.slip_speed, self.forward, self.backward)
 
+    def generalized_force(self, q: ca.SX, qdot: ca.SX) -> ca.SX:
+        """Return the contact force on the coordinates q, by the power that it does.
+
+        The normal force works at the rate of the gap, which must be a true distance, and friction at
+        the tangential velocity: Q = (d gap / dq)' f_n + (d v_t / d qdot)' f_t.
+        """
+        friction = ca.jacobian(self.tangential_velocity, qdot).T * (self.forward - self.backward)
+        return ca.jacobian(self.gap, q).T * self.normal + friction
+
 
 def pairs_of(points: Sequence[ContactPoint]) -> tuple[ca.SX, ca.SX]:
     """Return both sides of the pairs of all points, (4,) of each, one point after the other."""

@@ -15,6 +15,25 @@ from walk_optimizer.transcription.stage import StageKind
 from walk_optimizer.transcription.stage_functions import stage_functions
 
 
+def euler_rows(
+    state: ca.SX, previous: ca.SX, rate: ca.SX, interval: ca.SX, pairs: tuple[ca.SX, ca.SX]
+) -> ca.SX:
+    """Return the rows of a grid point of any model: implicit Euler, then contact.
+
+    Args:
+        state: At the point, (n,).
+        previous: At the point before, (n,).
+        rate: Time derivative of the state at the point, (n,).
+        interval: Time step h in [s].
+        pairs: Both sides a and b of the complementarity pairs, (m,) each.
+
+    Returns:
+        Dynamics (n,), the sides a (m,) and the products a b (m,).
+    """
+    a, b = pairs
+    return ca.vertcat(state - previous - interval * rate, a, a * b)
+
+
 def physical_rows() -> ca.Function:
     """Return (point, state before, spring, h, walker) -> the 28 rows of a grid point, all in SI units.
 
@@ -28,8 +47,8 @@ def physical_rows() -> ca.Function:
     force = net_force(walker, point.reaction)
     pdot = dynamics.momentum_rate(walker, point.q, qdot, point.u, force, spring)
     state = ca.vertcat(point.q, point.p)
-    a, b = contact_pairs(walker, point.q, qdot, point.reaction, point.slip_speed)
-    rows = ca.vertcat(state - previous - interval * ca.vertcat(qdot, pdot), a, a * b)
+    pairs = contact_pairs(walker, point.q, qdot, point.reaction, point.slip_speed)
+    rows = euler_rows(state, previous, ca.vertcat(qdot, pdot), interval, pairs)
     inputs = [column, previous, spring, interval, walker.symbols]
     return ca.Function("physical_rows", inputs, [rows])
 

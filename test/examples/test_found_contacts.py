@@ -1,0 +1,60 @@
+"""Contacts of a gait on stairs, found without a schedule, and what is said about them."""
+
+import numpy as np
+import pytest
+
+from walk_optimizer.cli.main import main
+from walk_optimizer.contact.schedule import FootMode
+from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.examples.catalogue import NAMES, solve_example
+from walk_optimizer.examples.finding import Finding, runs
+from walk_optimizer.examples.relaxation import RelaxedSolve
+from walk_optimizer.examples.terrain_gait import find_contacts, unscheduled_guess
+from walk_optimizer.gait import Certificate
+from walk_optimizer.guess import GuessShape
+from walk_optimizer.model.parameters import SpringMode, WalkerParameters
+from walk_optimizer.model.terrain import Terrain
+from walk_optimizer.request import GaitRequest
+from walk_optimizer.solve.session import SolveSession
+from walk_optimizer.solve.settings import solver_settings
+from walk_optimizer.solve.status import Status
+
+WALKER = WalkerParameters(terrain=Terrain(step_up=0.02))
+REQUEST = GaitRequest(0.25, 0.785, SpringMode.NONE, 20)
+SHAPE = GuessShape(0.05, 0.03)
+
+
+def test_the_guess_does_not_say_which_foot_stands():
+    loads = unscheduled_guess(WALKER, REQUEST, SHAPE)[[17, 20]]
+    np.testing.assert_array_equal(loads, WALKER.weight / 2)
+
+
+def test_on_stairs_contacts_are_found_and_certified():
+    gait = find_contacts(WALKER, REQUEST, [SHAPE], SolveSession(solver_settings(), 300.0, None))
+    assert gait.finding.certificate.certified
+    standing = gait.finding.schedule != FootMode.FREE
+    assert standing.any(axis=1).any()
+    assert not standing.all(), "a foot must leave the ground to climb"
+
+
+def test_runs_of_contacts_are_told_with_their_times():
+    modes = np.array([0, 0, 1, 1, 2], dtype=np.int8)
+    assert runs(modes) == [(0, 2, FootMode.FREE), (2, 4, FootMode.STICK), (4, 5, FootMode.SLIP_FORWARD)]
+    solves = (RelaxedSolve(0.1, Status.SOLVED, 7, 1.0), RelaxedSolve(1e-8, Status.ITERATION_LIMIT, 5, 2.0))
+    finding = Finding("A test", ("foot",), modes[None], 0.1, 2.5, solves, 1.0, Certificate(()))
+    assert finding.lines() == [
+        "A test",
+        "  foot: free 0.00-0.20, sticks 0.20-0.40, slips forward 0.40-0.50 s",
+        "  torque effort 2.5 (N m)^2 s, 12 iterations, 1.0 s",
+        "  iterations by bound on the products: 0.1: 7 (solved), 1e-08: 5 (iteration_limit)",
+    ]
+
+
+def test_an_example_that_does_not_exist_is_refused_with_those_that_do():
+    with pytest.raises(InvalidRequestError, match=", ".join(NAMES)):
+        solve_example("hopping")
+
+
+def test_a_solve_that_is_cut_short_is_no_success(capsys):
+    assert main(["example", "standing-start", "--time-limit", "0.01"]) == 1
+    assert "time_limit" in capsys.readouterr().out

@@ -1,0 +1,1 @@
+"""Problems whose contacts nobody gives: the optimiser finds them by complementarity alone."""
