@@ -7,6 +7,7 @@ pytest.importorskip("rclpy")
 pytest.importorskip("tf2_msgs")
 
 import pinocchio as pin
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nodes.graph import assert_left_cleanly
 from nodes.made_up_walk import NODE, Walk, nanoseconds_of, packaged_gait, stamp_of
 from rclpy.parameter import Parameter
@@ -107,11 +108,29 @@ def test_markers_are_paths_reactions_and_ground_of_the_gait(walk):
         assert {point.z for point in surface} == {0.0}
 
 
+def told(graph, reports):
+    """The next diagnosis of the node's references."""
+    found = []
+
+    def look():
+        found[:] = [one for report in reports for one in report.status if one.name == f"{NODE}: references"]
+        return found
+
+    graph.spin_until(look, "diagnostics")
+    return found[-1]
+
+
 def test_without_a_gait_there_are_links_but_no_forces_and_no_step_ahead(start, graph):
     start(NODE)
     walk = Walk(graph)
+    reports = graph.subscribe(DiagnosticArray, "/diagnostics")
+    silent = told(graph, reports)
+    assert silent.level == DiagnosticStatus.WARN
+    assert "no joint reference on /reference_publisher/joint_reference yet" in silent.message
     walk.send(0.1)
     walk.send(0.2)
+    reports.clear()
+    assert "not those of a gait" in told(graph, reports).message
     transforms, markers = walk.picture()
     assert set(transforms) == {"base_link", *LINKS}
     for namespace in ("ground_reaction", "ground_reaction_size", "feet_ahead"):

@@ -25,6 +25,7 @@ from walk_optimizer.nodes.running import run_node
 from walk_optimizer.nodes.scene_markers import SceneMarkers
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.transform_messages import transforms_to_message
+from walk_optimizer.nodes.visualizer_health import VisualizerHealth
 from walk_optimizer.nodes.walker_setting import WALKER_FILE, walker_of
 from walk_optimizer.references import JOINTS
 from walk_optimizer.scene.gait import ShownGait
@@ -84,18 +85,22 @@ class WalkerVisualizerNode(SuiteNode):
         )
         self._drawing = SceneMarkers(self.parameters["fixed_frame"], settings.leg_spacing)
         self._shown_ns: int | None = None
+        self._in_gait = False
         self._description = self.create_publisher(String, "robot_description", LATCHED)
         self._transforms = self.create_publisher(TFMessage, "tf", STREAM)
         self._markers = self.create_publisher(MarkerArray, "~/markers", STREAM)
         self._listen(GaitMessage, "gait", self._take_gait, LATCHED)
-        self._listen(JointState, "joint_reference", self._take_reference, STREAM)
+        references = self._listen(JointState, "joint_reference", self._take_reference, STREAM)
+        self._health = VisualizerHealth(self.diagnostics, self._wall, references)
         self.parameters.apply_changes(self._apply)
         self._description.publish(String(data=walker_urdf(self._walker, settings)))
         self.get_logger().info("ready")
 
-    def _listen(self, kind: type, setting: str, callback: Callable[[Any], None], qos: QoSProfile) -> None:
-        """Subscribe to the topic that a parameter names."""
-        self.create_subscription(kind, self.parameters[setting], callback, qos, callback_group=self.group)
+    def _listen(self, kind: type, setting: str, callback: Callable[[Any], None], qos: QoSProfile) -> str:
+        """Subscribe to the topic that a parameter names, and return its full name."""
+        topic = self.parameters[setting]
+        subscription = self.create_subscription(kind, topic, callback, qos, callback_group=self.group)
+        return str(subscription.topic_name)
 
     def _apply(self, names: set[str]) -> None:
         if "trail_duration" in names:
@@ -118,6 +123,10 @@ class WalkerVisualizerNode(SuiteNode):
         self._scene.follow(gait)
 
     def _take_reference(self, message: JointState) -> None:
+        due = self._is_due(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec)
+        # A gait tells where it leads; all else has to be followed from each reference to the next.
+        if not due and self._in_gait:
+            return
         try:
             position = joint_values(message, "position")
             effort = joint_values(message, "effort") if message.effort else None
@@ -125,8 +134,9 @@ class WalkerVisualizerNode(SuiteNode):
             self.get_logger().warning(f"reference not shown: {error}", throttle_duration_sec=1.0)
             return
         pose = self._scene.move(position)
-        stamp_ns = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-        if self._is_due(stamp_ns):
+        self._health.note(pose)
+        self._in_gait = pose.place is not None
+        if due:
             self._show(message, pose, effort)
 
     def _is_due(self, stamp_ns: int) -> bool:
