@@ -65,8 +65,8 @@ class Graph:
         """Return the future of a response."""
         return self.client(kind, name).call_async(kind.Request(**fields))
 
-    def result(self, future, what="an answer"):
-        self.spin_until(future.done, what)
+    def result(self, future, what="an answer", patience=PATIENCE):
+        self.spin_until(future.done, what, patience)
         return future.result()
 
     def call(self, kind, name, **fields):

@@ -83,23 +83,6 @@ def test_what_is_lacking_is_solved_once_and_stored(graph, start, stocked):
     assert_left_cleanly(library, library.stop(signal.SIGTERM))
 
 
-@pytest.mark.slow
-def test_an_optimizer_that_is_killed_is_told_and_its_successor_is_asked(graph, start, stocked):
-    start("gait_library", **stocked | {"points": 2000})
-    optimizer = start("gait_optimizer", walker_file=stocked["walker_file"])
-    graph.spin_until(lambda: "ready" in optimizer.output(), "the optimizer")
-    first = graph.send(GetGait, GET, speed=0.4, spring_mode="none")
-    graph.spin_until(lambda: "asking" in start.nodes[0].output(), "the question")
-    # Longer than the library looks for the optimizer: now it waits for the answer.
-    graph.spin_for(4.0)
-    # The library answers others while it waits.
-    assert graph.call(GetGait, GET, speed=SLOW, spring_mode=MODE).success
-    optimizer.kill()
-    answer = graph.result(first)
-    assert not answer.success
-    assert "gait_optimizer/optimize_gait went away" in answer.message or "gave no answer" in answer.message
-
-
 def test_a_cache_folder_that_is_missing_stops_the_start(start, tmp_path):
     node = start("gait_library", cache_folder=tmp_path / "missing")
     assert node.process.wait(60) == 1
