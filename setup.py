@@ -37,6 +37,9 @@ INTERFACES = [
 
 FIGURES = ["matplotlib>=3.8,<4"]
 
+# Drake's wheel carries SNOPT.
+SNOPT = ["drake>=1.50"]
+
 # pin (Pinocchio) is an independent rigid-body library, rosbags an independent reader of bags, xacro what
 # the walker's macro file is for, lxml reads security policies as SROS2 does.
 TEST = [
@@ -104,6 +107,7 @@ setup(
         "ros": ROS,
         "interfaces": INTERFACES,
         "figures": FIGURES,
+        "snopt": SNOPT,
         "test": TEST,
         "lint": LINT,
         "dev": [*ROS, *INTERFACES, *FIGURES, *TEST, *LINT],

@@ -2,6 +2,8 @@
 
 import argparse
 import sys
+from collections.abc import Callable
+from typing import TypeVar
 
 from walk_optimizer.cli.arguments import request_from, walker_from
 from walk_optimizer.cli.terminal import SolveProgress, interruptible
@@ -13,20 +15,42 @@ from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.solve.settings import SolverSettings
+from walk_optimizer.solve.status import ProgressCallback
+
+_Result = TypeVar("_Result")
 
 
-def solve(request: GaitRequest, walker: WalkerParameters, time_limit: float | None = None) -> Outcome:
+def watched(work: Callable[[ProgressCallback], _Result]) -> _Result:
+    """Return what work returns; its progress is shown on stderr.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C was pressed; the work has ended.
+    """
+    with interruptible() as interrupt:
+        progress = SolveProgress(interrupt)
+        try:
+            return work(progress)
+        finally:
+            progress.close()
+
+
+def solve(
+    request: GaitRequest,
+    walker: WalkerParameters,
+    time_limit: float | None = None,
+    settings: SolverSettings | None = None,
+) -> Outcome:
     """Return the outcome of a solve whose progress is shown on stderr.
 
     Raises:
         KeyboardInterrupt: Ctrl-C was pressed; the solve has ended.
     """
-    with interruptible() as interrupt:
-        progress = SolveProgress(interrupt)
-        try:
-            return optimize(request, walker, time_limit=time_limit, progress=progress)
-        finally:
-            progress.close()
+    return watched(
+        lambda progress: optimize(
+            request, walker, settings=settings, time_limit=time_limit, progress=progress
+        )
+    )
 
 
 def chosen_gait(args: argparse.Namespace) -> Gait:

@@ -1,7 +1,9 @@
 """`solve`: one gait, its report and its certificate."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from walk_optimizer.cli.arguments import (
     Subparsers,
@@ -13,6 +15,12 @@ from walk_optimizer.cli.arguments import (
     request_from,
     walker_from,
 )
+from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.request import GaitRequest
+
+if TYPE_CHECKING:
+    from walk_optimizer.solve.settings import SolverSettings
 
 _TEXT = """\
 solve for the gait of least torque at a speed
@@ -25,7 +33,12 @@ _EPILOG = """\
 examples:
   walk-optimizer solve --speed 0.3185
   walk-optimizer solve --speed 1.15km/h --spring stiffness_and_equilibrium --save
-  walk-optimizer solve --speed 0.5 --points 400 --time-limit 60 --export gait.csv"""
+  walk-optimizer solve --speed 0.5 --points 400 --time-limit 60 --export gait.csv
+  walk-optimizer solve --speed 0.5 --points 50 --solver uno
+  walk-optimizer solve --speed 1.15km/h --points 50 --formulation report
+        what became of the report's own program: residuals, no gait unless certified"""
+
+_FORMULATIONS = ("ours", "report")
 
 
 def add_parser(verbs: Subparsers) -> None:
@@ -35,15 +48,66 @@ def add_parser(verbs: Subparsers) -> None:
     add_walker(parser)
     add_library(parser)
     parser.add_argument("--time-limit", metavar="SECONDS", help="give up after this time")
+    parser.add_argument("--solver", metavar="NAME", help="another back end (default: config/solver.yaml)")
+    parser.add_argument(
+        "--formulation",
+        choices=_FORMULATIONS,
+        default=_FORMULATIONS[0],
+        help="ours, or the report's own program, to see how far it gets (default: %(default)s)",
+    )
     parser.add_argument("--save", action="store_true", help="store the gait in the library")
     parser.add_argument("--export", type=Path, metavar="CSV", help="write the numbers to a file")
     parser.set_defaults(run=run)
+
+
+def solver_settings_from(args: argparse.Namespace) -> "SolverSettings":
+    """Return the settings with the chosen back end.
+
+    Raises:
+        InvalidRequestError: the report's formulation is asked for together with what it can't have.
+        ConfigurationError: there is no such back end.
+        MissingDependencyError: its library is missing.
+    """
+    if args.formulation == "report" and (args.solver not in (None, "ipopt") or args.save or args.export):
+        raise InvalidRequestError(
+            "--formulation report is IPOPT's and shows residuals: leave --solver, --save and --export out"
+        )
+
+    from walk_optimizer.solve.registry import back_end
+    from walk_optimizer.solve.settings import solver_settings
+
+    settings = solver_settings()
+    if args.solver is not None:
+        settings = replace(settings, back_end=args.solver)
+    back_end(settings.back_end)
+    return settings
+
+
+def _try_report(
+    request: GaitRequest, walker: WalkerParameters, settings: "SolverSettings", time_limit: float | None
+) -> int:
+    """Solve the report's own formulation and print how far it got."""
+    from walk_optimizer.cli.gaits import watched
+    from walk_optimizer.cli.text import certificate_text, gait_text, report_text
+    from walk_optimizer.reference_solve import solve_reference
+
+    outcome = watched(
+        lambda progress: solve_reference(
+            request, walker, settings=settings, time_limit=time_limit, progress=progress
+        )
+    )
+    print(report_text(outcome.report))
+    if outcome.gait is not None:
+        print(gait_text(outcome.gait))
+    print(f"\n{certificate_text(outcome.certificate)}")
+    return 0 if outcome.gait is not None else 1
 
 
 def run(args: argparse.Namespace) -> int:
     """Solve, print, store."""
     request, walker = request_from(args), walker_from(args)
     time_limit = None if args.time_limit is None else positive_seconds(args.time_limit)
+    settings = solver_settings_from(args)
 
     from walk_optimizer.cli.gaits import solve
     from walk_optimizer.cli.text import (
@@ -62,7 +126,9 @@ def run(args: argparse.Namespace) -> int:
     if args.export:
         writable_target(args.export)
     print(request_text(request))
-    outcome = solve(request, walker, time_limit)
+    if args.formulation == "report":
+        return _try_report(request, walker, settings, time_limit)
+    outcome = solve(request, walker, time_limit, settings)
     print(report_text(outcome.report))
     if outcome.gait is None:
         return 1

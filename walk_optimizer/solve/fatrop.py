@@ -5,6 +5,7 @@ shared variables along all of them, see `staging`.
 """
 
 import weakref
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -41,7 +42,7 @@ class _Instance:
             "nlp_jac_g": staged.function("nlp_jac_g", staged.g, staged.jacobian),
             "nlp_hess_l": hessian,
         }
-        settings = {
+        settings: dict[str, Any] = {
             "cache": staged.values() | derivatives,
             "print_time": False,
             "error_on_fail": False,

@@ -1,6 +1,7 @@
 """IPOPT by way of CasADi, with exact derivatives from outside."""
 
 import weakref
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -23,6 +24,17 @@ _STATUS = {
 }
 
 
+@dataclass(frozen=True)
+class IpoptOptions(SolveOptions):
+    """Options of a solve by IPOPT alone.
+
+    Attributes:
+        further: Names and values of IPOPT's own options, which come last.
+    """
+
+    further: tuple[tuple[str, str | float], ...] = ()
+
+
 def _settings(options: SolveOptions) -> dict[str, Any]:
     """Return the options under IPOPT's names."""
     settings: dict[str, Any] = {
@@ -38,6 +50,8 @@ def _settings(options: SolveOptions) -> dict[str, Any]:
         push = min(1e-6, 10 * options.barrier)
         settings |= {"mu_strategy": "monotone", "mu_init": options.barrier}
         settings |= {"bound_push": push, "bound_frac": push}
+    if isinstance(options, IpoptOptions):
+        settings |= dict(options.further)
     return settings
 
 

@@ -50,6 +50,7 @@ class SolveSession:
         *,
         objective_unit: float,
         barrier: float | None = None,
+        options: SolveOptions | None = None,
     ) -> Solution:
         """Solve one program of the session.
 
@@ -59,12 +60,14 @@ class SolveSession:
             stage: Name for the progress.
             objective_unit: What one unit of the scaled objective is, in [(N m)^2].
             barrier: First barrier parameter for a start that is close to a solution.
+            options: Of the back end, in place of the settings and the barrier.
         """
 
         def monitor(state: IterationState) -> Status | None:
             return self._watch(state, stage, objective_unit)
 
-        options = SolveOptions(self._settings.tolerance, self._settings.maximum_iterations, barrier)
+        if options is None:
+            options = SolveOptions(self._settings.tolerance, self._settings.maximum_iterations, barrier)
         solution = self._back_end.solve(problem, start, options, monitor)
         self.iterations += solution.iterations
         return solution
