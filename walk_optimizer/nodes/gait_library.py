@@ -121,7 +121,8 @@ class GaitLibraryNode(ManagedNode):
             if selection is Selection.NEAREST:
                 raise
             self.get_logger().info(
-                with_fields("asking the optimizer", speed=wanted.speed, spring_mode=wanted.spring_mode)
+                with_fields("asking the optimizer", speed=wanted.speed, spring_mode=wanted.spring_mode),
+                throttle_duration_sec=1.0,
             )
             try:
                 return await self._solve(wanted), OPTIMIZER, f"solved now; {error}"
