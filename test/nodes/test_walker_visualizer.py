@@ -192,16 +192,21 @@ def test_a_frame_with_a_slash_and_an_unknown_walker_stop_the_start(start):
         assert text in node.output()
 
 
-def test_names_are_relative_so_that_several_walkers_share_a_graph(start, graph):
-    start(NODE, namespace="w1")
-    graph.publisher(JointState, "/w1/reference_publisher/joint_reference")
-    graph.spin_until(lambda: (NODE, "/w1") in graph.node.get_node_names_and_namespaces(), "the node")
-    offered = dict(graph.node.get_publisher_names_and_types_by_node(NODE, "/w1"))
-    assert offered["/w1/tf"] == ["tf2_msgs/msg/TFMessage"]
-    assert offered["/w1/robot_description"] == ["std_msgs/msg/String"]
-    assert offered[f"/w1/{NODE}/markers"] == ["visualization_msgs/msg/MarkerArray"]
-    (endpoint,) = graph.node.get_publishers_info_by_topic("/w1/robot_description")
+def test_names_are_relative_so_that_several_walkers_share_a_graph(shared, graph):
+    graph.spin_until(lambda: (NODE, f"/{shared}") in graph.node.get_node_names_and_namespaces(), "the node")
+    offered = {}
+
+    def look():
+        offered.update(graph.node.get_publisher_names_and_types_by_node(NODE, f"/{shared}"))
+        return f"/{shared}/{NODE}/markers" in offered
+
+    graph.spin_until(look, "its topics")
+    assert offered[f"/{shared}/tf"] == ["tf2_msgs/msg/TFMessage"]
+    assert offered[f"/{shared}/robot_description"] == ["std_msgs/msg/String"]
+    (endpoint,) = graph.node.get_publishers_info_by_topic(f"/{shared}/robot_description")
     assert endpoint.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    absolute = {name for name in offered if not name.startswith(f"/{shared}/")}
+    assert absolute <= {"/rosout", "/parameter_events", "/diagnostics"}
 
 
 @pytest.mark.parametrize("name", ["tf2_msgs/msg/TFMessage", "visualization_msgs/msg/MarkerArray"])

@@ -32,7 +32,7 @@ def walk(profile, rate, duration, begin=0.0):
         yield reference, reference.base + np.array([2 * cycles * profile.step_length, 0.0])
 
 
-@pytest.mark.parametrize("rate", [200.0, 30.0, 3.1])
+@pytest.mark.parametrize("rate", [100.0, 30.0, 3.1])
 def test_the_base_is_the_walks_over_ten_steps_at_any_rate(solved, rate):
     _, shown = solved
     tracker = WalkTracker(WALKER)
@@ -65,10 +65,10 @@ def test_the_standing_foot_stands_and_a_foot_lands_a_step_ahead(solved):
 def test_without_a_gait_the_lowest_foot_carries_the_walker(solved):
     _, shown = solved
     tracker = WalkTracker(WALKER)
-    poses = [tracker.take(one.position) for one, _ in walk(shown.profile, 500.0, 6 * shown.profile.step_time)]
+    poses = [tracker.take(one.position) for one, _ in walk(shown.profile, 500.0, 3 * shown.profile.step_time)]
     assert all(pose.place is None for pose in poses)
     walked = poses[-1].base[0] - poses[0].base[0]
-    assert walked == pytest.approx(6 * shown.profile.step_length, rel=0.03)
+    assert walked == pytest.approx(3 * shown.profile.step_length, rel=0.03)
 
 
 def test_references_off_the_gait_have_no_place_in_it_and_the_base_goes_on(solved):
