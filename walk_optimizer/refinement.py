@@ -9,10 +9,10 @@ from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.contact.schedule import FootMode, single_impact
 from walk_optimizer.gait import Certificate, Gait, RefinedGait
 from walk_optimizer.mechanics import foot_arm, horizontal_and_vertical
+from walk_optimizer.mesh_adaptation import MeshErrors, resampled, trajectory_on
 from walk_optimizer.model.parameters import KneeSpring
-from walk_optimizer.refined_certificate import BETWEEN_TOLERANCE, certify_refined, excess_between
+from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refined_trajectory import RefinedTrajectory
-from walk_optimizer.replay import interval_errors
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
@@ -26,12 +26,8 @@ _INITIAL_INTERVALS = 24
 _FEWEST_INTERVALS = 3
 _MOST_PHASES = 3
 _ROUNDS = 4
-_MOST_PARTS = 4
-_SAFETY = 0.5
 # Barrier parameter for a start from the report's grid or from a coarser mesh.
 _BARRIER = 1e-5
-# Largest difference of an interval from its replay, in [rad] or [m].
-LOCAL_ERROR = 2e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,14 +92,15 @@ class _Refinement:
         solutions = [self._solved(mesh, self._initial_points(mesh)) for mesh in self._initial_meshes()]
         best = min(solutions, key=lambda one: one.effort)
         for _ in range(_ROUNDS):
-            if best.trajectory is None:
+            mesh, trajectory = best.mesh, best.trajectory
+            if trajectory is None:
                 return best
-            errors = interval_errors(self.walker, best.spring, best.trajectory)
-            excess = np.max(excess_between(self.walker, self.request.step_length, best.trajectory), axis=0)
-            best = replace(best, local_error=float(errors.max()))
-            if best.local_error <= LOCAL_ERROR and excess.max() <= _SAFETY * BETWEEN_TOLERANCE:
+            errors = MeshErrors.of(self.walker, self.request.step_length, best.spring, trajectory)
+            best = replace(best, local_error=float(errors.local.max()))
+            if errors.met:
                 return best
-            best = self._solved(*_divided(best, errors, excess))
+            finer = errors.divided(mesh)
+            best = self._solved(finer, resampled(trajectory, best.spring, mesh, finer))
         return best
 
     def _initial_meshes(self) -> list[Mesh]:
@@ -154,7 +151,7 @@ class _Refinement:
         if not solution.solved:
             return RefinedSolution(solution.status, mesh, None, points.spring)
         found = refined.unpack(solution.x)
-        return RefinedSolution(Status.SOLVED, mesh, _trajectory(mesh, found), found.spring)
+        return RefinedSolution(Status.SOLVED, mesh, trajectory_on(mesh, found), found.spring)
 
 
 def _even_mesh(phases: tuple[Phase, ...]) -> Mesh:
@@ -162,50 +159,3 @@ def _even_mesh(phases: tuple[Phase, ...]) -> Mesh:
     shares = np.diff([phase.start for phase in phases] + [1.0])
     counts = np.maximum(_FEWEST_INTERVALS, np.round(shares * _INITIAL_INTERVALS).astype(int))
     return Mesh(phases, tuple(np.full(count, 1 / count) for count in counts))
-
-
-def _divided(solution: RefinedSolution, errors: FloatArray, excess: FloatArray) -> tuple[Mesh, RefinedPoints]:
-    """Return a mesh with parts of the intervals that are too long, and the solution at its nodes.
-
-    The local error of an interval falls with the sixth power of its length. Where a bound is left
-    between the nodes the interval is halved.
-
-    Args:
-        solution: On the present mesh.
-        errors: Local error of each interval, (n,).
-        excess: How far each leaves its bounds between the nodes, (n,).
-    """
-    parts = np.ceil((errors / (_SAFETY * LOCAL_ERROR)) ** (1 / 6)).astype(int)
-    parts = np.maximum(parts, np.where(excess > _SAFETY * BETWEEN_TOLERANCE, 2, 1))
-    mesh = solution.mesh.divided(np.clip(parts, 1, _MOST_PARTS))
-    if solution.trajectory is None:
-        raise ValueError("only a solution can be divided")
-    return mesh, _resampled(solution.trajectory, solution.spring, solution.mesh, mesh)
-
-
-def _trajectory(mesh: Mesh, points: RefinedPoints) -> RefinedTrajectory:
-    """Return the values on a mesh as a trajectory."""
-    breaks = np.concatenate([[0.0], np.cumsum(mesh.lengths(points.durations))])
-    impulses = np.zeros((mesh.intervals, 4))
-    impulses[mesh.first_intervals] = points.impulses
-    return RefinedTrajectory(breaks, points.states, points.torques, points.forces, impulses)
-
-
-def _resampled(old: RefinedTrajectory, spring: KneeSpring, old_mesh: Mesh, mesh: Mesh) -> RefinedPoints:
-    """Evaluate the polynomials of a solution at the nodes of another mesh of the same phases."""
-    first = old_mesh.first_intervals
-    ends = [*old.breaks[first], old.step_time]
-    nodes = mesh.node_times(np.diff(ends))
-    intervals = [old.locate(float((when[0] + when[-1]) / 2))[0] for when in nodes]
-    places = [
-        (when - old.breaks[index]) / old.lengths[index] for index, when in zip(intervals, nodes, strict=True)
-    ]
-    pairs = list(zip(intervals, places, strict=True))
-    return RefinedPoints(
-        states=np.array([[old.state(i, x) for x in place] for i, place in pairs]),
-        torques=np.array([[old.torque(i, x) for x in place[1:]] for i, place in pairs]),
-        forces=np.array([[old.force(i, x) for x in place[1:]] for i, place in pairs]),
-        durations=np.diff(ends),
-        impulses=old.impulses[first],
-        spring=spring,
-    )

@@ -102,6 +102,8 @@ def test_what_a_foot_cannot_do_makes_a_side_negative(what, hip_velocity, reactio
 
 def test_net_force_is_forward_less_backward_and_normal_of_each_foot():
     walker = SymbolicWalker()
-    force = ca.substitute(net_force(walker, ca.SX([5, 2, 10, 1, 4, 20])), walker.symbols, ca.DM(WALKER.vector()))
+    force = ca.substitute(
+        net_force(walker, ca.SX([5, 2, 10, 1, 4, 20])), walker.symbols, ca.DM(WALKER.vector())
+    )
     force = np.asarray(ca.evalf(force))
     np.testing.assert_array_equal(force, [[3, -3], [10, 20]])

@@ -16,7 +16,8 @@ from library.made_up_gait import made_up_gait, with_refinement
 from walk_optimizer.errors import GaitFileError
 from walk_optimizer.gait import Gait, RefinedGait, Trajectory
 from walk_optimizer.gait_files import gait_file_name, read_gait_file, write_gait_file
-from walk_optimizer.gait_files.codec import LARGEST_FILE, decode, encode
+from walk_optimizer.gait_files.codec import decode, encode
+from walk_optimizer.gait_files.container import LARGEST_FILE
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 
@@ -53,7 +54,7 @@ def packed(arrays: dict[str, np.ndarray], compressed: bool = False) -> bytes:
 
 def with_header(data: bytes, change) -> bytes:
     """Return the file with a changed header, and a checksum that fits it."""
-    from walk_optimizer.gait_files.codec import _checksum
+    from walk_optimizer.gait_files.container import _checksum
 
     arrays = arrays_of(data)
     header = json.loads(arrays.pop("header").tobytes())

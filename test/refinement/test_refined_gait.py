@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from walk_optimizer.gait import Gait, RefinedGait
+from walk_optimizer.mesh_adaptation import resampled
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refinement import refine
 from walk_optimizer.replay import replay_step
@@ -27,12 +28,12 @@ def test_its_torques_replayed_over_the_step_end_where_it_ends(gait: Gait, refine
 def test_a_mesh_twice_as_fine_changes_its_effort_by_less_than_a_thousandth(
     gait: Gait, session: SolveSession
 ) -> None:
-    from walk_optimizer.refinement import _Refinement, _resampled
+    from walk_optimizer.refinement import _Refinement
 
     solution = refine(gait, session)
     assert solution.trajectory is not None
     finer = solution.mesh.divided(np.full(solution.mesh.intervals, 2))
-    start = _resampled(solution.trajectory, solution.spring, solution.mesh, finer)
+    start = resampled(solution.trajectory, solution.spring, solution.mesh, finer)
     again = _Refinement(gait, session)._solved(finer, start)
     assert again.effort == pytest.approx(solution.effort, rel=1e-3)
 

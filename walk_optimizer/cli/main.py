@@ -18,7 +18,19 @@ from walk_optimizer.errors import WalkOptimizerError
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 130
 
-_VERBS = ("solve", "table", "library", "export", "picture", "reproduce", "example", "urdf", "bag", "demo")
+_VERBS = (
+    "solve",
+    "table",
+    "library",
+    "transitions",
+    "export",
+    "picture",
+    "reproduce",
+    "example",
+    "urdf",
+    "bag",
+    "demo",
+)
 
 _DESCRIPTION = """\
 Least-torque walking gaits for a planar biped with knee springs.

@@ -1,8 +1,5 @@
 """The bytes of a gait file: a gait to bytes, and back after every check (docs/gait_format.md)."""
 
-import hashlib
-import io
-import json
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
@@ -10,41 +7,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer import __version__
 from walk_optimizer.errors import GaitFileError, InvalidRequestError
 from walk_optimizer.gait import Certificate, Gait, Trajectory
-from walk_optimizer.gait_files.archive import read_archive
-from walk_optimizer.gait_files.checks import check_finite, check_shape, positive
+from walk_optimizer.gait_files.checks import check_shape, positive
+from walk_optimizer.gait_files.container import FileFormat, packed, unpacked
 from walk_optimizer.gait_files.header import from_plain, to_plain
 from walk_optimizer.gait_files.refined import REFINED_PREFIX, refined_arrays, refined_from, refined_header
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import SolveReport
 
-FORMAT = "walk_optimizer.gait"
-VERSION = 1
-# 2000 points take 0.4 MB; a file above this is no gait, whatever its header says.
-LARGEST_FILE = 16 * 1024 * 1024
-_HEADER = "header"
-_HEADER_ENTRIES = {"format", "version", "software", "checksum", "walker", "request", "spring"} | {
-    "report",
-    "certificate",
-    "step_length",
-    "refined",
-}
+GAIT_FORMAT = FileFormat(
+    "walk_optimizer.gait",
+    1,
+    "gait file",
+    frozenset({"walker", "request", "spring", "report", "certificate", "step_length", "refined"}),
+)
 _ROWS = {"q": 6, "p": 6, "u": 3, "reaction": 6, "slip_speed": 2}
 
 
 def encode(gait: Gait) -> bytes:
     """Return the bytes of a gait file; equal gaits give equal bytes."""
     arrays = {name: getattr(gait.trajectory, name) for name in _trajectory_names()}
-    arrays |= refined_arrays(gait.refined)
-    for name, values in arrays.items():
-        check_finite(name, values)
-    header = {
-        "format": FORMAT,
-        "version": VERSION,
-        "software": __version__,
+    entries = {
         "walker": to_plain(gait.walker),
         "request": to_plain(gait.request),
         "spring": to_plain(gait.spring),
@@ -53,11 +38,7 @@ def encode(gait: Gait) -> bytes:
         "step_length": gait.step_length,
         "refined": refined_header(gait.refined),
     }
-    header["checksum"] = _checksum(header, arrays)
-    text = json.dumps(header, indent=1, sort_keys=True, allow_nan=False)
-    buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **{_HEADER: np.frombuffer(text.encode(), np.uint8)}, **arrays)
-    return buffer.getvalue()
+    return packed(GAIT_FORMAT, entries, arrays | refined_arrays(gait.refined))
 
 
 def decode(data: bytes) -> Gait:
@@ -66,11 +47,7 @@ def decode(data: bytes) -> Gait:
     Raises:
         GaitFileError: the bytes are no whole gait file of this version.
     """
-    arrays = read_archive(data, LARGEST_FILE)
-    header = _header(arrays.pop(_HEADER, None))
-    if header["checksum"] != _checksum(header, arrays):
-        raise GaitFileError("damaged: the checksum does not fit the content")
-    return _gait(header, arrays)
+    return _gait(*unpacked(GAIT_FORMAT, data))
 
 
 def _trajectory_names() -> tuple[str, ...]:
@@ -78,39 +55,9 @@ def _trajectory_names() -> tuple[str, ...]:
     return tuple(entry.name for entry in fields(Trajectory))
 
 
-def _checksum(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
-    """Return the SHA-256 of the header without its checksum and of all arrays."""
-    rest = {key: value for key, value in header.items() if key != "checksum"}
-    digest = hashlib.sha256(json.dumps(rest, sort_keys=True).encode())
-    for name in sorted(arrays):
-        digest.update(f"{name}{arrays[name].shape}".encode())
-        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
-    return digest.hexdigest()
-
-
-def _header(values: NDArray[Any] | None) -> dict[str, Any]:
-    """Return the checked header of this version."""
-    if values is None or values.dtype != np.uint8:
-        raise GaitFileError("not a gait file: it has no header")
-    try:
-        header = json.loads(values.tobytes().decode())
-    except (ValueError, RecursionError) as error:
-        raise GaitFileError(f"damaged: the header is no JSON ({error})") from error
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise GaitFileError(f"not a gait file: the header does not name the format {FORMAT}")
-    if header.get("version") != VERSION:
-        raise GaitFileError(f"format version is {header.get('version')!r}, this program reads {VERSION}")
-    wrong = sorted(set(header) ^ _HEADER_ENTRIES)
-    if wrong:
-        raise GaitFileError(f"header has missing or unknown entries: {', '.join(wrong)}")
-    return header
-
-
 def _gait(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Gait:
     """Return the gait of a header and its arrays."""
     request = _request(header)
-    for name, values in arrays.items():
-        check_finite(name, values)
     return Gait(
         walker=from_plain(WalkerParameters, header["walker"], "walker"),
         request=request,

@@ -6,7 +6,8 @@ from pathlib import Path
 from walk_optimizer.errors import GaitFileError
 from walk_optimizer.gait import Gait
 from walk_optimizer.gait_files.access import read_limited, replace_file
-from walk_optimizer.gait_files.codec import LARGEST_FILE, decode, encode
+from walk_optimizer.gait_files.codec import decode, encode
+from walk_optimizer.gait_files.container import LARGEST_FILE
 from walk_optimizer.model.parameters import WalkerParameters
 
 SUFFIX = ".npz"
@@ -48,13 +49,13 @@ def read_gait_file(path: Path, walker: WalkerParameters | None = None) -> Gait:
     data = read_limited(path, LARGEST_FILE)
     try:
         gait = decode(data)
-        _check_walker(gait.walker, walker)
+        check_walker(gait.walker, walker)
     except GaitFileError as error:
         raise GaitFileError(f"{path}: {error}") from error
     return gait
 
 
-def _check_walker(found: WalkerParameters, expected: WalkerParameters | None) -> None:
+def check_walker(found: WalkerParameters, expected: WalkerParameters | None) -> None:
     """Raise GaitFileError that names the parameters in which two walkers differ."""
     if expected is None or found == expected:
         return

@@ -35,6 +35,14 @@ def refined_of(gait: Gait) -> RefinedGait:
     return gait.refined
 
 
+def pace_name(pace: Pace) -> str:
+    """Return the name of a pace in files: the same request has the same name."""
+    if isinstance(pace, Standing):
+        return "stand"
+    request = pace.request
+    return f"{request.spring_mode.value}_{request.step_length:.4f}m_{request.step_time:.4f}s"
+
+
 def spring_of(pace: Pace) -> KneeSpring:
     """Return the knee spring of a pace."""
     return pace.spring if isinstance(pace, Standing) else refined_of(pace).spring

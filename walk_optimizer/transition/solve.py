@@ -1,38 +1,30 @@
 """Solves for the steps from one pace to another: first guess, adapted mesh, certificate."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.errors import InvalidRequestError
-from walk_optimizer.gait import Certificate, RefinedGait
-from walk_optimizer.model.kinematics import HIP_X
+from walk_optimizer.gait import Certificate
+from walk_optimizer.mesh_adaptation import MeshErrors, resampled, trajectory_on
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
-from walk_optimizer.refined_certificate import BETWEEN_TOLERANCE, excess_between
 from walk_optimizer.refined_trajectory import RefinedTrajectory
-from walk_optimizer.refinement import LOCAL_ERROR, RefinedSolution, _divided, _trajectory
-from walk_optimizer.replay import interval_errors
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import SolverSettings, solver_settings
 from walk_optimizer.solve.status import FamilyViolation, ProgressCallback, SolveReport, Status
-from walk_optimizer.transcription.boundary import JOINT_ROWS
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
 from walk_optimizer.transcription.scaling import torque_unit
-from walk_optimizer.transcription.transition import End, TransitionLimits, TransitionProblem
+from walk_optimizer.transcription.transition import TransitionLimits, TransitionProblem
 from walk_optimizer.transition.certificate import certify_steps
+from walk_optimizer.transition.chain import end_in, steps_of
 from walk_optimizer.transition.guess import even_mesh, faded_points
 from walk_optimizer.transition.paces import (
-    EXCHANGED,
     Pace,
     border_state,
-    former_step_sees,
     spring_of,
-    step_length,
-    velocity,
-    with_legs_exchanged,
 )
-from walk_optimizer.transition.plan import ContactPlan, contact_plan
+from walk_optimizer.transition.plan import contact_plan
 from walk_optimizer.transition.settings import TransitionSettings, transition_settings
 from walk_optimizer.transition.standing import Standing
 from walk_optimizer.transition.transition import Transition, TransitionOutcome
@@ -42,7 +34,6 @@ FloatArray = NDArray[np.float64]
 # Barrier parameters for a start from a faded guess, and from a coarser mesh.
 _FIRST_BARRIER, _NEXT_BARRIER = 1e-3, 1e-5
 _ROUNDS = 5
-_SAFETY = 0.5
 # On level ground the length of treads plays no part.
 _ANY_TREAD = 1.0
 
@@ -143,7 +134,7 @@ class _Solve:
         settings = request.settings
         limits = TransitionLimits(request.torque_limit, settings.shortest_step, settings.longest_step)
         self.limits = limits
-        self.end = _end(request.target, self.plan)
+        self.end = end_in(request.target, self.plan)
 
     def run(self) -> TransitionOutcome:
         """Return the transition on a mesh fine enough for its error."""
@@ -152,15 +143,15 @@ class _Solve:
         barrier = _FIRST_BARRIER
         for _ in range(_ROUNDS):
             status, points = self._solved(mesh, points, barrier)
-            trajectory = _trajectory(mesh, points)
+            trajectory = trajectory_on(mesh, points)
             if status is not Status.SOLVED:
                 break
-            errors = interval_errors(self.walker, self.spring, trajectory)
-            excess = np.max(excess_between(self.walker, _ANY_TREAD, trajectory), axis=0)
-            if errors.max() <= LOCAL_ERROR and excess.max() <= _SAFETY * BETWEEN_TOLERANCE:
+            errors = MeshErrors.of(self.walker, _ANY_TREAD, self.spring, trajectory)
+            if errors.met:
                 break
-            solution = RefinedSolution(status, mesh, trajectory, self.spring)
-            (mesh, points), barrier = _divided(solution, errors, excess), _NEXT_BARRIER
+            finer = errors.divided(mesh)
+            points = resampled(trajectory, self.spring, mesh, finer)
+            mesh, barrier = finer, _NEXT_BARRIER
         return self._outcome(status, mesh, trajectory)
 
     def _solved(self, mesh: Mesh, points: RefinedPoints, barrier: float) -> tuple[Status, RefinedPoints]:
@@ -183,9 +174,14 @@ class _Solve:
     def _outcome(self, status: Status, mesh: Mesh, trajectory: RefinedTrajectory) -> TransitionOutcome:
         """Return the certified steps, or the report of why there are none."""
         request = self.request
-        bare = self._steps(mesh, trajectory)
+        bare = steps_of(self.walker, self.spring, trajectory, mesh, self.phases)
         steps, certificate = certify_steps(
-            self.walker, request.source, request.target, bare, request.torque_limit
+            self.walker,
+            request.source,
+            request.target,
+            bare,
+            request.torque_limit,
+            replay=status is Status.SOLVED,
         )
         if status is Status.SOLVED and not certificate.certified:
             status = Status.NOT_CERTIFIED
@@ -197,18 +193,6 @@ class _Solve:
             self.walker, request.source, request.target, steps, request.torque_limit, certificate
         )
         return TransitionOutcome(transition, report)
-
-    def _steps(self, mesh: Mesh, trajectory: RefinedTrajectory) -> list[RefinedGait]:
-        """Cut the chain into steps, each seen from its own stance foot."""
-        counts = np.array([part.size for part in mesh.parts])
-        ends = np.cumsum([int(own.sum()) for own in np.split(counts, np.cumsum(self.phases)[:-1])])
-        steps, origin = [], 0.0
-        for number, (first, end) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
-            step = _seen_from(_cut(trajectory, int(first), int(end)), origin, exchanged=number % 2 == 1)
-            length = step_length(self.walker, step.states[-1, -1])
-            steps.append(RefinedGait(step, self.spring, length, Certificate(())))
-            origin += length
-        return steps
 
     def _report(self, status: Status, certificate: Certificate, effort: float) -> SolveReport:
         remarks = [status.sentence.replace("gait", "transition")]
@@ -227,33 +211,3 @@ class _Solve:
                 FamilyViolation(one.family, one.violation, one.unit) for one in certificate.entries
             ),
         )
-
-
-def _end(target: Pace, plan: ContactPlan) -> End:
-    """Return the end of a chain of steps that leads to a pace, the legs named as in its first step."""
-    state = former_step_sees(target.walker, border_state(target))
-    if len(plan.steps) % 2 == 0:
-        state = state[EXCHANGED]
-    joints = list(JOINT_ROWS)
-    speeds = velocity(target.walker, state)[joints]
-    return End(state[joints], speeds, plan.landing, at_rest=isinstance(target, Standing))
-
-
-def _cut(trajectory: RefinedTrajectory, first: int, end: int) -> RefinedTrajectory:
-    """Return some of the intervals, their time beginning with 0."""
-    part = slice(first, end)
-    return RefinedTrajectory(
-        trajectory.breaks[first : end + 1] - trajectory.breaks[first],
-        trajectory.states[part],
-        trajectory.torques[part],
-        trajectory.forces[part],
-        trajectory.impulses[part],
-    )
-
-
-def _seen_from(trajectory: RefinedTrajectory, origin: float, exchanged: bool) -> RefinedTrajectory:
-    """Return a trajectory as a step sees it whose stance foot is at a place in [m] along the way."""
-    seen = with_legs_exchanged(trajectory) if exchanged else trajectory
-    states = np.array(seen.states)
-    states[:, :, HIP_X] -= origin
-    return replace(seen, states=states)

@@ -1,0 +1,83 @@
+"""Adapts the mesh of a refined solution to an estimate of its error."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.refined_certificate import BETWEEN_TOLERANCE, excess_between
+from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.replay import interval_errors
+from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
+
+FloatArray = NDArray[np.float64]
+
+_MOST_PARTS = 4
+_SAFETY = 0.5
+# Largest difference of an interval from its replay, in [rad] or [m].
+LOCAL_ERROR = 2e-7
+
+
+@dataclass(frozen=True, eq=False)
+class MeshErrors:
+    """How far the intervals of a solution are from the truth and beyond their bounds.
+
+    Attributes:
+        local: Difference of each interval from its replay in [rad] or [m], (n,).
+        excess: How far each leaves its bounds between the nodes in [rad] or [m], (n,).
+    """
+
+    local: FloatArray
+    excess: FloatArray
+
+    @classmethod
+    def of(
+        cls, walker: WalkerParameters, tread: float, spring: KneeSpring, trajectory: RefinedTrajectory
+    ) -> "MeshErrors":
+        """Estimate the errors of a trajectory; treads are `tread` in [m] long."""
+        excess = np.max(excess_between(walker, tread, trajectory), axis=0)
+        return cls(interval_errors(walker, spring, trajectory), excess)
+
+    @property
+    def met(self) -> bool:
+        """Whether the mesh is fine enough."""
+        return bool(self.local.max() <= LOCAL_ERROR and self.excess.max() <= _SAFETY * BETWEEN_TOLERANCE)
+
+    def divided(self, mesh: Mesh) -> Mesh:
+        """Return the mesh with parts of the intervals that are too long.
+
+        The local error of an interval falls with the sixth power of its length. Where a bound is left
+        between the nodes the interval is halved.
+        """
+        parts = np.ceil((self.local / (_SAFETY * LOCAL_ERROR)) ** (1 / 6)).astype(int)
+        parts = np.maximum(parts, np.where(self.excess > _SAFETY * BETWEEN_TOLERANCE, 2, 1))
+        return mesh.divided(np.clip(parts, 1, _MOST_PARTS))
+
+
+def trajectory_on(mesh: Mesh, points: RefinedPoints) -> RefinedTrajectory:
+    """Return the values on a mesh as a trajectory."""
+    breaks = np.concatenate([[0.0], np.cumsum(mesh.lengths(points.durations))])
+    impulses = np.zeros((mesh.intervals, 4))
+    impulses[mesh.first_intervals] = points.impulses
+    return RefinedTrajectory(breaks, points.states, points.torques, points.forces, impulses)
+
+
+def resampled(old: RefinedTrajectory, spring: KneeSpring, old_mesh: Mesh, mesh: Mesh) -> RefinedPoints:
+    """Evaluate the polynomials of a solution at the nodes of another mesh of the same phases."""
+    first = old_mesh.first_intervals
+    ends = [*old.breaks[first], old.step_time]
+    nodes = mesh.node_times(np.diff(ends))
+    intervals = [old.locate(float((when[0] + when[-1]) / 2))[0] for when in nodes]
+    places = [
+        (when - old.breaks[index]) / old.lengths[index] for index, when in zip(intervals, nodes, strict=True)
+    ]
+    pairs = list(zip(intervals, places, strict=True))
+    return RefinedPoints(
+        states=np.array([[old.state(i, x) for x in place] for i, place in pairs]),
+        torques=np.array([[old.torque(i, x) for x in place[1:]] for i, place in pairs]),
+        forces=np.array([[old.force(i, x) for x in place[1:]] for i, place in pairs]),
+        durations=np.diff(ends),
+        impulses=old.impulses[first],
+        spring=spring,
+    )
