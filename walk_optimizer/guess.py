@@ -79,10 +79,18 @@ def _with_momenta(walker: WalkerParameters, request: GaitRequest, q: FloatArray)
 
 
 def resampled(points: FloatArray, count: int) -> FloatArray:
-    """Return points (23, N) interpolated linearly onto `count` grid points of the same step."""
+    """Return points (23, N) interpolated linearly onto `count` grid points of the same step.
+
+    The reactions of the first point are the impulse of the landing spread over one interval: they grow
+    as the intervals shrink, and the points after it have no part in them.
+    """
     old = np.arange(1, points.shape[1] + 1) / points.shape[1]
     new = np.arange(1, count + 1) / count
-    return np.array([np.interp(new, old, row) for row in points])
+    finer = np.array([np.interp(new, old, row) for row in points])
+    forces = points[layout.REACTION]
+    finer[layout.REACTION] = np.array([np.interp(new, old[1:], row[1:]) for row in forces])
+    finer[layout.REACTION, 0] = forces[:, 0] * count / points.shape[1]
+    return finer
 
 
 @dataclass(frozen=True)

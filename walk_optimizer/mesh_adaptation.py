@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
-from walk_optimizer.refined_certificate import BETWEEN_TOLERANCE, excess_between
+from walk_optimizer.refined_certificate import excess_between
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.replay import interval_errors
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
@@ -17,6 +17,8 @@ _MOST_PARTS = 4
 _SAFETY = 0.5
 # Largest difference of an interval from its replay, in [rad] or [m].
 LOCAL_ERROR = 2e-7
+# How far a bound may be left between nodes, in [rad] or [m]: what is left there is torque saved.
+LARGEST_EXCESS = 5e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,16 +44,17 @@ class MeshErrors:
     @property
     def met(self) -> bool:
         """Whether the mesh is fine enough."""
-        return bool(self.local.max() <= LOCAL_ERROR and self.excess.max() <= _SAFETY * BETWEEN_TOLERANCE)
+        return bool(self.local.max() <= LOCAL_ERROR and self.excess.max() <= LARGEST_EXCESS)
 
     def divided(self, mesh: Mesh) -> Mesh:
         """Return the mesh with parts of the intervals that are too long.
 
-        The local error of an interval falls with the sixth power of its length. Where a bound is left
-        between the nodes the interval is halved.
+        The local error of an interval falls with the sixth power of its length, what it leaves of a
+        bound between its nodes with the second.
         """
-        parts = np.ceil((self.local / (_SAFETY * LOCAL_ERROR)) ** (1 / 6)).astype(int)
-        parts = np.maximum(parts, np.where(self.excess > _SAFETY * BETWEEN_TOLERANCE, 2, 1))
+        of_local = (self.local / (_SAFETY * LOCAL_ERROR)) ** (1 / 6)
+        of_excess = np.sqrt(self.excess / (_SAFETY * LARGEST_EXCESS))
+        parts = np.ceil(np.maximum(of_local, of_excess)).astype(int)
         return mesh.divided(np.clip(parts, 1, _MOST_PARTS))
 
 

@@ -8,6 +8,7 @@ accurate grid.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 from walk_optimizer.certificate import certify, landing_distance
 from walk_optimizer.contact.schedule import CONTACT_FAMILIES
@@ -117,7 +118,9 @@ class _Pipeline:
         optima = distinct(candidates)
         if self.session.stopped or not optima:
             return self._failure(candidates)
-        best = self.search.with_free_contacts(optima[0])
+        best = self.search.with_free_contacts(
+            optima[0], self.settings.contact_rounds, self.settings.contact_iterations
+        )
         if self.session.verdict is Status.CANCELLED:
             return self._failure(candidates)
         return self._certified(best)
@@ -130,16 +133,18 @@ class _Pipeline:
             if not self.session.stopped:
                 coarse.append(self.search.from_start(start, coarse_points))
                 self.starts += 1
-        best = distinct(coarse)[: self.settings.kept_starts]
-        return self._with_families(best, "fixed_schedule") or coarse
-
-    def _with_families(self, candidates: list[Candidate], stage: str) -> list[Candidate]:
-        return [
-            self.search.with_family(candidate, contacts, self.request.points, stage)
-            for candidate in candidates
-            for contacts in CONTACT_FAMILIES
+        kept = self.settings.kept_starts
+        families = [
+            self.search.with_family(candidate, contacts, coarse_points, "search")
+            for candidate, contacts in product(distinct(coarse)[:kept], CONTACT_FAMILIES)
             if not self.session.stopped
         ]
+        fine = [
+            self.search.with_family(one, one.contacts, self.request.points, "fixed_schedule")
+            for one in distinct(families)[:kept]
+            if not self.session.stopped
+        ]
+        return fine or coarse
 
     def _from_seeds(self, seeds: Sequence[Gait]) -> list[Candidate]:
         """Return the optima that continue the seeds."""

@@ -28,8 +28,10 @@ FloatArray = NDArray[np.float64]
 
 # Optima whose objectives agree to this relative difference are taken for one.
 SAME_OPTIMUM = 1e-4
-# Barrier parameter for starts that meet the optimality conditions but for their contacts.
+# Barrier parameters for starts that meet the optimality conditions but for their contacts, and for
+# optima of another grid or of a neighbouring request.
 _NEAR = 1e-9
+_RESAMPLED = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +100,7 @@ class Search:
         request = replace(self.request, points=points)
         guess = kinematic_guess(self.walker, request, start.shape)
         candidate = Candidate(start.name, "single-impact", guess, start.spring, Status.SOLVED)
-        return self.with_family(candidate, "single-impact", points, "search")
+        return self.with_family(candidate, "single-impact", points, "search", barrier=None)
 
     def from_gait(self, gait: Gait, contacts: str) -> Candidate:
         """Return the optimum that continues a gait of another request with a contact family."""
@@ -106,28 +108,63 @@ class Search:
         candidate = Candidate(name, contacts, gait.trajectory.stacked(), gait.spring, Status.SOLVED)
         return self.with_family(candidate, contacts, self.request.points, "continuation")
 
-    def with_family(self, candidate: Candidate, contacts: str, points: int, stage: str) -> Candidate:
-        """Return the candidate solved on `points` grid points with a contact family."""
-        guess = replace(candidate, contacts=contacts, points=resampled(candidate.points, points))
-        return self._with_schedule(guess, CONTACT_FAMILIES[contacts](points), stage)
+    def with_family(
+        self,
+        candidate: Candidate,
+        contacts: str,
+        points: int,
+        stage: str,
+        *,
+        barrier: float | None = _RESAMPLED,
+    ) -> Candidate:
+        """Return the candidate solved on `points` grid points with a contact family.
 
-    def with_free_contacts(self, best: Candidate) -> Candidate:
+        Args:
+            candidate: Where to start.
+            contacts: Name of the contact family.
+            points: Number of grid points.
+            stage: Name for the progress.
+            barrier: First barrier parameter; None for a start that may be far from any optimum.
+        """
+        guess = replace(candidate, contacts=contacts, points=resampled(candidate.points, points))
+        return self._with_schedule(guess, CONTACT_FAMILIES[contacts](points), stage, barrier=barrier)
+
+    def with_free_contacts(self, best: Candidate, rounds: int, iterations: int) -> Candidate:
         """Return the optimum with the contacts that complementarity finds; `best` if those are no better.
 
-        The contacts found are solved once more as a fixed schedule, so that every product of the
-        result is zero and not merely small. That also decides whether they are worth having, so
-        the relaxed problem itself need not have converged. Once the session is stopped nothing more
-        is tried.
+        In each round the relaxed problem takes some iterations from the best solution, and the contacts
+        that it moves to are solved as a fixed schedule: then every product of the result is zero and
+        not merely small, and it is plain whether they are worth having. So the relaxed problem itself
+        need not converge, and where `best` is stationary a round costs little. Once the session is
+        stopped nothing more is tried.
+
+        Args:
+            best: A solved candidate on the requested grid.
+            rounds: Largest number of rounds.
+            iterations: Of the relaxed problem in a round.
         """
+        for _ in range(rounds):
+            found = self._with_other_contacts(best, iterations)
+            if found is None or found.mean_effort >= best.mean_effort * (1 - SAME_OPTIMUM):
+                break
+            best = found
+        return replace(best, points=self._with_slip_speeds(best.points))
+
+    def _with_other_contacts(self, best: Candidate, iterations: int) -> Candidate | None:
+        """Return the optimum of the contacts that the relaxed problem moves to; None if it stays."""
         start = replace(best, points=self._with_slip_speeds(best.points))
         problem = complementarity_problem(self.request, self.walker, self.relaxation)
-        relaxed = self._solve(problem, start, "complementarity", barrier=_NEAR)
-        if self.session.stopped:
-            return start
-        parts = (relaxed.points[rows] for rows in (layout.Q, layout.P, layout.REACTION))
-        schedule = schedule_of(self.walker, self.request.step_length, *parts)
+        relaxed = self._solve(problem, start, "complementarity", barrier=_NEAR, maximum_iterations=iterations)
+        schedule = self._schedule(relaxed)
+        if self.session.stopped or np.array_equal(schedule, self._schedule(best)):
+            return None
         found = self._with_schedule(replace(relaxed, contacts="found"), schedule, "polish", barrier=_NEAR)
-        return found if found.solved and found.mean_effort < best.mean_effort * (1 - SAME_OPTIMUM) else start
+        return found if found.solved else None
+
+    def _schedule(self, candidate: Candidate) -> Schedule:
+        """Return the contacts that a candidate uses, (2, N)."""
+        parts = (candidate.points[rows] for rows in (layout.Q, layout.P, layout.REACTION))
+        return schedule_of(self.walker, self.request.step_length, *parts)
 
     def _with_schedule(
         self, guess: Candidate, schedule: Schedule, stage: str, *, barrier: float | None = None
@@ -137,11 +174,26 @@ class Search:
         solved = self._solve(problem, guess, stage, barrier=barrier)
         return replace(solved, points=self._with_slip_speeds(solved.points))
 
-    def _solve(self, problem: Problem, guess: Candidate, stage: str, *, barrier: float | None) -> Candidate:
+    def _solve(
+        self,
+        problem: Problem,
+        guess: Candidate,
+        stage: str,
+        *,
+        barrier: float | None,
+        maximum_iterations: int | None = None,
+    ) -> Candidate:
         # The scaled objective is the integral of 1/2 |u|^2, F its sum over the grid points.
         unit = torque_unit(self.walker) ** 2 * guess.points.shape[1] / self.request.step_time
         start = to_scaled(self.walker, guess.points, guess.spring)
-        solution = self.session.solve(problem, start, stage, objective_unit=unit, barrier=barrier)
+        solution = self.session.solve(
+            problem,
+            start,
+            stage,
+            objective_unit=unit,
+            barrier=barrier,
+            maximum_iterations=maximum_iterations,
+        )
         points, spring = from_scaled(self.walker, solution.x)
         return replace(guess, points=points, spring=spring, status=solution.status, detail=solution.detail)
 

@@ -93,7 +93,7 @@ def test_cancelling(stage, walker):
     assert outcome.report.message.startswith("cancelled by the caller")
 
 
-@pytest.mark.parametrize("stage", ["complementarity", "polish", "refinement"])
+@pytest.mark.parametrize("stage", ["complementarity", "refinement"])
 def test_cancelling_the_last_stages(walker, stage):
     stages = []
     outcome = optimize(
@@ -110,7 +110,6 @@ def test_cancelling_the_last_stages(walker, stage):
     ("stage", "remark"),
     [
         ("complementarity", "search for other contacts"),
-        ("polish", "search for other contacts"),
         ("refinement", "refinement"),
     ],
 )

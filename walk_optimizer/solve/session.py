@@ -50,6 +50,7 @@ class SolveSession:
         *,
         objective_unit: float,
         barrier: float | None = None,
+        maximum_iterations: int | None = None,
         options: SolveOptions | None = None,
     ) -> Solution:
         """Solve one program of the session.
@@ -60,14 +61,16 @@ class SolveSession:
             stage: Name for the progress.
             objective_unit: What one unit of the scaled objective is, in [(N m)^2].
             barrier: First barrier parameter for a start that is close to a solution.
-            options: Of the back end, in place of the settings and the barrier.
+            maximum_iterations: By default the settings'.
+            options: Of the back end, in place of the settings, the barrier and the limit.
         """
 
         def monitor(state: IterationState) -> Status | None:
             return self._watch(state, stage, objective_unit)
 
         if options is None:
-            options = SolveOptions(self._settings.tolerance, self._settings.maximum_iterations, barrier)
+            limit = maximum_iterations or self._settings.maximum_iterations
+            options = SolveOptions(self._settings.tolerance, limit, barrier)
         solution = self._back_end.solve(problem, start, options, monitor)
         self.iterations += solution.iterations
         return solution

@@ -17,6 +17,8 @@ class SolverSettings:
         back_end: Name of the solver of nonlinear programs.
         coarse_points: Grid of the search over starts.
         kept_starts: Best distinct coarse optima that go on to the requested grid.
+        contact_rounds: Most rounds in which complementarity looks for other contacts.
+        contact_iterations: Of the relaxed problem in such a round.
         tolerance: Scaled optimality error at which a program counts as solved.
         maximum_iterations: Of one program.
         relaxation: Bound on each complementarity product, in units of weight times 1 m or 1 m/s.
@@ -26,6 +28,8 @@ class SolverSettings:
     back_end: str
     coarse_points: int
     kept_starts: int
+    contact_rounds: int
+    contact_iterations: int
     tolerance: float
     maximum_iterations: int
     relaxation: float
