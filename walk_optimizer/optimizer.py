@@ -118,12 +118,14 @@ class _Pipeline:
         optima = distinct(candidates)
         if self.session.stopped or not optima:
             return self._failure(candidates)
-        best = self.search.with_free_contacts(
-            optima[0], self.settings.contact_rounds, self.settings.contact_iterations
-        )
+        freed = [self._freed(one) for one in optima[: self.settings.freed_optima]]
         if self.session.verdict is Status.CANCELLED:
             return self._failure(candidates)
-        return self._certified(best)
+        return self._certified(min(freed, key=lambda one: one.mean_effort))
+
+    def _freed(self, candidate: Candidate) -> Candidate:
+        rounds, iterations = self.settings.contact_rounds, self.settings.contact_iterations
+        return self.search.with_free_contacts(candidate, rounds, iterations)
 
     def _from_kinematics(self) -> list[Candidate]:
         """Return the optima on the requested grid that the kinematic starts lead to."""
@@ -149,8 +151,7 @@ class _Pipeline:
     def _from_seeds(self, seeds: Sequence[Gait]) -> list[Candidate]:
         """Return the optima that continue the seeds."""
         self.starts += len(seeds)
-        pairs = ((seed, contacts) for seed in seeds for contacts in CONTACT_FAMILIES)
-        return [self.search.from_gait(*pair) for pair in pairs if not self.session.stopped]
+        return [candidate for seed in seeds for candidate in self.search.from_gait(seed)]
 
     def _certified(self, best: Candidate) -> Outcome:
         """Return the gait of a solved candidate, unless its certificate fails."""

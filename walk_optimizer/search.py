@@ -32,6 +32,8 @@ SAME_OPTIMUM = 1e-4
 # optima of another grid or of a neighbouring request.
 _NEAR = 1e-9
 _RESAMPLED = 1e-4
+# What contacts of no family are called.
+OWN_CONTACTS = "found"
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +104,21 @@ class Search:
         candidate = Candidate(start.name, "single-impact", guess, start.spring, Status.SOLVED)
         return self.with_family(candidate, "single-impact", points, "search", barrier=None)
 
-    def from_gait(self, gait: Gait, contacts: str) -> Candidate:
-        """Return the optimum that continues a gait of another request with a contact family."""
+    def from_gait(self, gait: Gait) -> list[Candidate]:
+        """Return the optima that continue a gait of another request, also with its own contacts."""
         name = f"continued-{gait.speed:.4f}-{gait.request.spring_mode.value}"
-        candidate = Candidate(name, contacts, gait.trajectory.stacked(), gait.spring, Status.SOLVED)
-        return self.with_family(candidate, contacts, self.request.points, "continuation")
+        seed = Candidate(name, OWN_CONTACTS, gait.trajectory.stacked(), gait.spring, Status.SOLVED)
+        seed = replace(seed, points=resampled(seed.points, self.request.points))
+        schedules = {name: family(self.request.points) for name, family in CONTACT_FAMILIES.items()}
+        own = self._schedule(seed)
+        if not any(np.array_equal(own, one) for one in schedules.values()):
+            schedules[OWN_CONTACTS] = own
+        guesses = ((replace(seed, contacts=contacts), one) for contacts, one in schedules.items())
+        return [
+            self._with_schedule(*guess, "continuation", barrier=_RESAMPLED)
+            for guess in guesses
+            if not self.session.stopped
+        ]
 
     def with_family(
         self,
@@ -158,7 +170,9 @@ class Search:
         schedule = self._schedule(relaxed)
         if self.session.stopped or np.array_equal(schedule, self._schedule(best)):
             return None
-        found = self._with_schedule(replace(relaxed, contacts="found"), schedule, "polish", barrier=_NEAR)
+        found = self._with_schedule(
+            replace(relaxed, contacts=OWN_CONTACTS), schedule, "polish", barrier=_NEAR
+        )
         return found if found.solved else None
 
     def _schedule(self, candidate: Candidate) -> Schedule:

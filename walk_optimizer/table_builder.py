@@ -18,7 +18,7 @@ from walk_optimizer.optimizer import Outcome, optimize, with_refinement
 from walk_optimizer.request import GaitRequest, gait_table_settings
 from walk_optimizer.search import SAME_OPTIMUM
 from walk_optimizer.solve.session import SolveSession
-from walk_optimizer.solve.settings import solver_settings
+from walk_optimizer.solve.settings import table_solver_settings
 
 # A key of the table: index of the speed, spring mode.
 Key = tuple[int, SpringMode]
@@ -58,12 +58,20 @@ class _Job:
 
 def _run(job: _Job) -> Outcome:
     """Solve one entry, in a process of the pool."""
-    return optimize(job.request, job.walker, seeds=job.seeds, from_scratch=job.from_scratch, refine=False)
+    settings = table_solver_settings()
+    return optimize(
+        job.request,
+        job.walker,
+        settings=settings,
+        seeds=job.seeds,
+        from_scratch=job.from_scratch,
+        refine=False,
+    )
 
 
 def _refine(gait: Gait) -> Outcome:
     """Refine one entry, in a process of the pool."""
-    settings = solver_settings()
+    settings = table_solver_settings()
     return with_refinement(gait, SolveSession(settings, settings.time_limit, None))
 
 

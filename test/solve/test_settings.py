@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from walk_optimizer.errors import ConfigurationError
-from walk_optimizer.solve.settings import SolverSettings, solver_settings
+from walk_optimizer.solve.settings import SolverSettings, solver_settings, table_solver_settings
 
 NUMBERS = [name for name in asdict(solver_settings()) if name != "back_end"]
 
@@ -25,6 +25,13 @@ def test_the_packaged_settings_are_those_of_the_design():
     assert settings.back_end == "ipopt"
     assert settings.relaxation <= 1e-7
     assert settings is solver_settings()
+
+
+def test_the_table_is_searched_for_longer_than_a_single_request():
+    settings, request = table_solver_settings(), solver_settings()
+    assert settings.freed_optima > request.freed_optima
+    assert settings.contact_rounds > request.contact_rounds
+    assert settings.tolerance == request.tolerance
 
 
 def test_a_file_is_read_as_it_is_written(tmp_path):

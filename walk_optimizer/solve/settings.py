@@ -17,6 +17,7 @@ class SolverSettings:
         back_end: Name of the solver of nonlinear programs.
         coarse_points: Grid of the search over starts.
         kept_starts: Best distinct coarse optima that go on to the requested grid.
+        freed_optima: Best distinct optima whose contacts are then set free.
         contact_rounds: Most rounds in which complementarity looks for other contacts.
         contact_iterations: Of the relaxed problem in such a round.
         tolerance: Scaled optimality error at which a program counts as solved.
@@ -28,6 +29,7 @@ class SolverSettings:
     back_end: str
     coarse_points: int
     kept_starts: int
+    freed_optima: int
     contact_rounds: int
     contact_iterations: int
     tolerance: float
@@ -44,7 +46,7 @@ class SolverSettings:
 
     @classmethod
     def from_yaml(cls, path: Path | None = None) -> "SolverSettings":
-        """Read the settings, by default the packaged `config/solver.yaml`.
+        """Read settings, by default those of single requests, `config/solver.yaml`.
 
         Raises:
             ConfigurationError: an entry is missing, unknown or impossible.
@@ -54,5 +56,11 @@ class SolverSettings:
 
 @cache
 def solver_settings() -> SolverSettings:
-    """Return the packaged settings, read once."""
+    """Return the packaged settings of single requests, read once."""
     return SolverSettings.from_yaml()
+
+
+@cache
+def table_solver_settings() -> SolverSettings:
+    """Return the packaged settings of the table's gaits (`config/table_solver.yaml`), read once."""
+    return SolverSettings.from_yaml(config_file("table_solver.yaml"))
