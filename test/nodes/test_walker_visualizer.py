@@ -15,9 +15,13 @@ from rclpy.qos import DurabilityPolicy
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
 from urdf.described_walker import DescribedWalker
 from visualization_msgs.msg import Marker
 
+from walk_optimizer.description.skeleton import FEET
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.nodes.conversions import gait_to_message
 from walk_optimizer.nodes.qos import LATCHED
 from walk_optimizer.recording.definitions import type_hash
 from walk_optimizer.references import JOINTS
@@ -156,6 +160,23 @@ def test_joints_are_matched_by_name_and_a_message_without_them_is_refused(walk):
     assert walk.send(0.6) is not straight
 
 
+def test_a_gait_that_is_none_is_refused_and_the_former_one_stays(walk):
+    walk.announce()
+    for field, value in (
+        ("step_time", 0.0),
+        ("step_time", 1e12),
+        ("step_length", float("nan")),
+        ("points", 7),
+    ):
+        message = gait_to_message(packaged_gait())
+        setattr(message, field, value)
+        walk.gaits.publish(message)
+    walk.graph.spin_for(0.5)
+    reference = walk.send(0.3)
+    _, markers = walk.picture()
+    assert markers["ground_reaction", reference.step % 2].action == Marker.ADD
+
+
 def test_pictures_come_at_the_rate_of_the_parameter_by_the_stamps(walk, graph):
     walk.send(0.0)
     (answer,) = graph.set_parameters(f"/shared/{NODE}", Parameter("rate", value=10.0))
@@ -207,6 +228,19 @@ def test_names_are_relative_so_that_several_walkers_share_a_graph(shared, graph)
     assert endpoint.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
     absolute = {name for name in offered if not name.startswith(f"/{shared}/")}
     assert absolute <= {"/rosout", "/parameter_events", "/diagnostics"}
+
+
+def test_the_robot_stands_where_the_real_publisher_lets_it_stand(start, graph):
+    start("reference_publisher", namespace="real", rate=50.0)
+    start(NODE, namespace="real")
+    pictures = graph.subscribe(TFMessage, "/real/tf")
+    graph.spin_until(lambda: len(pictures) > 5, "pictures")
+    transforms = {one.child_frame_id: one for one in pictures[-1].transforms}
+    walker = WalkerParameters.from_yaml()
+    height = placement(transforms, "base_link").translation[2]
+    assert 0.9 * walker.leg_length < height <= walker.leg_length + 1e-9
+    for foot in FEET:
+        assert placement(transforms, foot).translation[2] == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["tf2_msgs/msg/TFMessage", "visualization_msgs/msg/MarkerArray"])

@@ -7,15 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.gait import RefinedGait, Trajectory
+from walk_optimizer.gait_files.checks import positive
 from walk_optimizer.mechanics import foot_arm
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.profile import EulerProfile, RefinedProfile, StepProfile, most_accurate
-from walk_optimizer.references import Cycle, sample_cycle
+from walk_optimizer.references import sample_cycle
 
 FloatArray = NDArray[np.float64]
 
-# The cycle is tabulated at this rate in [Hz] and straight between two entries.
-_RATE = 1000.0
+# The cycle is tabulated at so many places and straight between two of them.
+_TABLE_POINTS = 1600
 # Points of a foot's path over a step.
 _PATH_POINTS = 60
 
@@ -54,14 +55,17 @@ class ShownGait:
             step_length: Of that trajectory in [m].
             step_time: In [s].
             refined: Shown instead, where it is certified.
+
+        Raises:
+            GaitFileError: length or time are no finite positive numbers.
+            InvalidRequestError: the step is much shorter or longer than any walker's.
         """
+        positive(step_length, "step_length")
+        positive(step_time, "step_time")
         self.walker = walker
         self._trajectory, self._refined = trajectory, refined
         self.profile: StepProfile = most_accurate(EulerProfile(trajectory, step_length, step_time), refined)
-
-    @cached_property
-    def _cycle(self) -> Cycle:
-        return sample_cycle(self.profile, _RATE)
+        self._cycle = sample_cycle(self.profile, _TABLE_POINTS / (2 * self.profile.step_time))
 
     def locate(self, position: FloatArray) -> Place:
         """Return the place of the cycle that is nearest to joint positions (4,) in [rad]."""
