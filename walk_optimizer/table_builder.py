@@ -156,7 +156,7 @@ class _Builder:
         neighbours = [(index - 1, mode), (index + 1, mode)]
         neighbours += [(index, lesser) for lesser in _MODES[: _MODES.index(mode)]]
         seeds = tuple(self.table[one] for one in neighbours if one in improved)
-        return self._job(key, tuple(_loosened(seed, mode) for seed in seeds), from_scratch=False)
+        return self._job(key, tuple(loosened(seed, mode) for seed in seeds), from_scratch=False)
 
     def _solve(self, jobs: list[_Job], stage: str) -> set[Key]:
         """Run the jobs, keep what is better, and return the keys of the entries that improved."""
@@ -176,7 +176,7 @@ class _Builder:
         return known is None or gait.objective < known.objective * (1 - SAME_OPTIMUM)
 
 
-def _loosened(seed: Gait, mode: SpringMode) -> Gait:
+def loosened(seed: Gait, mode: SpringMode) -> Gait:
     """Return the seed with a spring inside its bounds where a mode with more freedom continues it."""
     if mode is SpringMode.NONE or seed.spring.stiffness > 0:
         return seed
