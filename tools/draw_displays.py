@@ -2,7 +2,7 @@
 
     .venv/bin/python tools/draw_displays.py docs/images
 
-Starts the library, the publisher and the visualizer as processes, has them walk, records what they
+Starts the nodes as processes, has them walk, records what they
 publish, and draws the last instant as rviz/walker.rviz and foxglove/walker.json say: their topics, camera,
 colours, panels. Neither program is run; fonts and shading are matplotlib's.
 """
@@ -37,7 +37,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
-from walk_optimizer_interfaces.srv import SetGait
+from walk_optimizer_interfaces.srv import GetGait, SetGait
 
 from walk_optimizer.cli.processes import NodeProcess, isolated_environment
 from walk_optimizer.nodes.qos import LATCHED, STREAM
@@ -45,14 +45,16 @@ from walk_optimizer.nodes.qos import LATCHED, STREAM
 FloatArray = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parent.parent
-NODES = ("gait_library", "reference_publisher", "walker_visualizer")
+NODES = ("gait_optimizer", "gait_library", "reference_publisher", "walker_visualizer")
 SPEED, MODE = 0.5338, "stiffness_and_equilibrium"
 # Room for the recorder to stall, so that plots have no gaps of its making.
 DEEP = QoSProfile(depth=5000)
 # Long enough for a start from standing, and for the plots, [s].
 WALKING = 8.0
-PATIENCE = 60.0
+PATIENCE = 300.0
 FIELD_OF_VIEW = 45.0
+# Length of a frame's axes when a layout says nothing, [m].
+FOXGLOVE_AXIS = 0.154
 
 
 # ------------------------------------------------------------------------------------------ recording
@@ -156,8 +158,9 @@ def is_early_in_right_step(recording: Recording) -> bool:
 
 
 def _walk(node: Node, executor: SingleThreadedExecutor) -> None:
+    library = node.create_client(GetGait, "gait_library/get_gait")
     client = node.create_client(SetGait, "reference_publisher/set_gait")
-    _spin(executor, PATIENCE, client.service_is_ready)
+    _spin(executor, PATIENCE, lambda: library.service_is_ready() and client.service_is_ready())
     _spin(executor, 1.0)
     future = client.call_async(SetGait.Request(speed=SPEED, spring_mode=MODE))
     _spin(executor, PATIENCE, future.done)
@@ -418,7 +421,7 @@ def draw_foxglove(recording: Recording, path: Path) -> None:
             aspect = body[2] * 13.0 / (body[3] * 7.2)
             view = View3D(axes, foxglove_camera(panel, recording), recording, aspect)
             view.robot()
-            view.frames(0.2 * panel["scene"]["transforms"]["axisScale"])
+            view.frames(FOXGLOVE_AXIS)
             (topic,) = (one for one in panel["topics"].values() if one["visible"])
             view.markers({name for name, settings in topic["namespaces"].items() if settings["visible"]})
         else:

@@ -92,6 +92,7 @@ def test_foxglove_takes_topics_frames_and_namespaces_that_there_are(graph, walk)
     (panel,) = (panel for name, panel in FOXGLOVE["configById"].items() if name.startswith("3D!"))
     transforms, markers = walk.picture()
     assert panel["followTf"] in transforms
+    assert panel["fixedFrame"] == transforms["base_link"].header.frame_id
     (layer,) = panel["layers"].values()
     assert endpoint(graph, layer["topic"]).topic_type == "std_msgs/msg/String"
     drawn = {topic: settings for topic, settings in panel["topics"].items() if settings["visible"]}
