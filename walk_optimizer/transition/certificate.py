@@ -18,7 +18,16 @@ from walk_optimizer.refined_certificate import (
     largest,
 )
 from walk_optimizer.replay import interval_errors
-from walk_optimizer.transition.paces import Pace, border_state, next_step_sees, step_length, velocity
+from walk_optimizer.transition.paces import (
+    Pace,
+    border_state,
+    end_state,
+    next_step_sees,
+    refined_of,
+    step_length,
+    velocity,
+)
+from walk_optimizer.transition.standing import Standing
 
 FloatArray = NDArray[np.float64]
 
@@ -59,7 +68,11 @@ def certify_steps(
             entries.append(_replay_entry(walker, step))
         certified.append(replace(step, certificate=Certificate(tuple(entries))))
         before = next_step_sees(walker, step.trajectory.states[-1, -1])
-    joins = _arrival_entries(walker, before, border_state(target))
+    begin = steps[0].trajectory.states[0, 0, :6] - end_state(source)[:6]
+    joins = [
+        CertificateEntry("departure", largest(begin), "m, rad", _join_tolerance(source)),
+        *_arrival_entries(walker, before, target),
+    ]
     every = (entry for step in certified for entry in step.certificate.entries)
     return tuple(certified), Certificate((*_largest_of_each(every), *joins))
 
@@ -72,13 +85,11 @@ def _step_entries(
     nodes = trajectory.states[:, 1:].reshape(-1, 12).T
     mechanics = mechanics_at(walker, step.spring, nodes[:6], nodes[6:])
     forces = trajectory.forces.reshape(-1, 4).T
-    begin = trajectory.states[0, 0, :6] - before[:6]
     landing = step_length(walker, trajectory.states[-1, -1]) - step.step_length
     torque = max(0.0, float(np.abs(trajectory.torques).max()) - torque_limit)
     return [
         *collocation_entries(walker, trajectory, mechanics),
         *jump_entries(walker, step, before),
-        CertificateEntry("departure", largest(begin), "m, rad", JOINT_TOLERANCE),
         CertificateEntry("landing", abs(landing), "m", _TOLERANCE),
         *contact_entries(walker, step.step_length, mechanics, forces),
         *bound_entries(walker, step.step_length, trajectory),
@@ -92,17 +103,33 @@ def _replay_entry(walker: WalkerParameters, step: RefinedGait) -> CertificateEnt
     return CertificateEntry("interval_replay", error, "m, rad", _TOLERANCE)
 
 
-def _arrival_entries(
-    walker: WalkerParameters, reached: FloatArray, wanted: FloatArray
-) -> list[CertificateEntry]:
+def _arrival_entries(walker: WalkerParameters, reached: FloatArray, target: Pace) -> list[CertificateEntry]:
     """Return how far the state (12,) that the last step ends in is from the target's."""
+    wanted, tolerance = end_state(target), _join_tolerance(target)
     apart = reached[:6] - wanted[:6]
     speeds = velocity(walker, reached) - velocity(walker, wanted)
     return [
-        CertificateEntry("arrival_joints", largest(apart[2:]), "rad", JOINT_TOLERANCE),
-        CertificateEntry("arrival_hip", largest(apart[[HIP_X, HIP_Y]]), "m", _TOLERANCE),
-        CertificateEntry("arrival_velocity", largest(speeds), "m/s, rad/s", _TOLERANCE),
+        CertificateEntry("arrival_joints", largest(apart[2:]), "rad", tolerance),
+        CertificateEntry("arrival_hip", largest(apart[[HIP_X, HIP_Y]]), "m", max(tolerance, _TOLERANCE)),
+        CertificateEntry("arrival_velocity", largest(speeds), "m/s, rad/s", _stated(target, "kinematics")),
     ]
+
+
+def _join_tolerance(pace: Pace) -> float:
+    """Return how closely steps have to join a pace, in [m] and [rad].
+
+    A gait that is blended from others is no closer to one of the walker than its own certificate says.
+    """
+    stated = _stated(pace, "landing")
+    return JOINT_TOLERANCE if stated <= _TOLERANCE else stated
+
+
+def _stated(pace: Pace, family: str) -> float:
+    """Return the tolerance of a family in a pace's own certificate, at least that of solved gaits."""
+    if isinstance(pace, Standing):
+        return _TOLERANCE
+    entries = refined_of(pace).certificate.entries
+    return max([_TOLERANCE, *(entry.tolerance for entry in entries if entry.family == family)])
 
 
 def _largest_of_each(entries: Iterable[CertificateEntry]) -> tuple[CertificateEntry, ...]:

@@ -71,16 +71,25 @@ class TransitionTable:
         """Return a sentence for each file that was set aside; it begins with the path."""
         return list(self._problems.values())
 
-    def find(self, source: Pace, target: Pace) -> Transition | None:
-        """Return the transition of fewest steps from one pace to another; None where there is none."""
+    def find(self, source: Pace, target: Pace, torque_limit: float = np.inf) -> Transition | None:
+        """Return the transition of fewest steps from one pace to another; None where there is none.
+
+        Args:
+            source: What is left.
+            target: What is reached.
+            torque_limit: Largest magnitude of each torque in [N m]; others are left out.
+        """
         wanted = (pace_name(source), pace_name(target))
         names = [name for name in self._files if (name.source, name.target) == wanted]
         for name in sorted(names, key=lambda one: one.steps):
             path = self._files[name]
             try:
-                return read_transition_file(path, source, target)
+                transition = read_transition_file(path, source, target)
             except GaitFileError as error:
                 self._problems[path] = str(error)
+                continue
+            if transition.peak_torques.max() <= torque_limit:
+                return transition
         return None
 
     def store(self, transition: Transition) -> Path:
@@ -119,8 +128,8 @@ class TransitionTable:
             names = self._fewest_steps(pace_name(source), pace_name(target), set(paces), unusable)
             found = []
             for pair in pairwise(names):
-                transition = self.find(paces[pair[0]], paces[pair[1]])
-                if transition is None or transition.peak_torques.max() > torque_limit:
+                transition = self.find(paces[pair[0]], paces[pair[1]], torque_limit)
+                if transition is None:
                     unusable.add(pair)
                     break
                 found.append(transition)
