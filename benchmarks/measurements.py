@@ -116,7 +116,7 @@ def ours_one_start(request: GaitRequest, free_contacts: bool) -> Score:
     one = Search(request, walker(), session, settings.relaxation)
     found = one.from_start(kinematic_starts(walker(), request.spring_mode)[0], request.points)
     if free_contacts:
-        found = one.with_free_contacts(found)
+        found = one.with_free_contacts(found, settings.contact_rounds, settings.contact_iterations)
     times, status = clock.read(), found.status.value
     return score_points(times, request, found.points, found.spring, status, session.iterations)
 

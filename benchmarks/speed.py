@@ -8,6 +8,7 @@ Failures stay in the tables. With `--only` the other sections of the page stay a
 """
 
 import argparse
+import traceback
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -58,6 +59,15 @@ def parsed_arguments() -> argparse.Namespace:
     return args
 
 
+def section_text(section: Callable[[Bench], str], bench: Bench) -> str:
+    """Return a section; one that fails says so, and lets the others be measured."""
+    try:
+        return section(bench)
+    except Exception as problem:  # noqa: BLE001  # failures stay on the page
+        traceback.print_exc()
+        return f"**Not measured: {type(problem).__name__}: {problem}**"
+
+
 def main() -> None:
     """Measure the sections that are asked for, and save each as soon as it is done."""
     args = parsed_arguments()
@@ -72,7 +82,7 @@ def main() -> None:
     bench = Bench()
     for name in (one for one in sections if one in args.only):
         where = machine()
-        text = f"{sections[name](bench)}\n\n{where}"
+        text = f"{section_text(sections[name], bench)}\n\n{where}"
         print(f"\n## {HEADINGS[name]}\n\n{text}\n", flush=True)
         save_section(args.output, TITLE, list(HEADINGS.values()), HEADINGS[name], text)
 

@@ -36,10 +36,10 @@ WHOLE_TABLE = 3600.0  # time limit in [s]
 
 COLD_NOTE = """\
 *One start* is the first kinematic guess on the full grid, the same for both. *Contacts free* adds the
-relaxed complementarity problem, and ours the polish of the contacts found. The *whole search* tries all
-starts: ours on a coarse grid first, plain on the full one, with its problem built once. Compiled stage
-functions are in the cache, except for *nothing compiled yet*. One start: the faster of two runs; searches:
-one run."""
+relaxed complementarity problem: plain solves it to the end, ours takes its first iterations, in rounds, and
+solves the contacts that it moves to. The *whole search* tries all starts: ours on a coarse grid first, plain
+on the full one, with its problem built once. Compiled stage functions are in the cache, except for *nothing
+compiled yet*. One start: the faster of two runs; searches: one run."""
 
 
 def cold(bench: Bench) -> str:
@@ -89,13 +89,13 @@ class Build:
 
 
 def build_library() -> Build:
-    """Run `walk-optimizer library build` into an empty folder."""
+    """Run `walk-optimizer library build` into an empty folder; gaits that it does not find are missing."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name).resolve()
         program = [sys.executable, "-m", "walk_optimizer.cli.main", "library", "build"]
         began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(
-            [*program, "--output", str(folder)], check=True, timeout=WHOLE_TABLE, stdout=subprocess.DEVNULL
+            [*program, "--output", str(folder)], check=False, timeout=WHOLE_TABLE, stdout=subprocess.DEVNULL
         )
         after, elapsed = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter() - began
         spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

@@ -89,6 +89,24 @@ def test_plain_collocation_continues_a_gait_of_the_table_with_a_certificate():
     assert certify_refined(WALKER, gait.request, refined).certified
 
 
+@pytest.mark.parametrize("free_contacts", [False, True])
+def test_both_sides_of_a_comparison_end_with_certified_gaits_of_one_effort(free_contacts):
+    from measurements import ours_one_start, plain_one_start
+
+    scores = [one(REQUEST, free_contacts) for one in (ours_one_start, plain_one_start)]
+    assert all(score.certified and score.seconds > 0 and score.iterations > 0 for score in scores)
+    # The bound on the products leaves plain a little below.
+    assert scores[1].objective == pytest.approx(scores[0].objective, rel=1e-3)
+
+
+def test_a_new_speed_is_solved_from_a_gait_of_the_table():
+    from measurements import library_gait, resolved
+
+    neighbour = library_gait(GaitRequest.for_step(0.25, 0.785, SpringMode.NONE))
+    refined = resolved(GaitRequest.for_speed(0.325, SpringMode.NONE, 20), neighbour)
+    assert refined.certificate.certified
+
+
 def test_a_broken_solution_scores_as_no_gait(plain):
     from measurements import score_points
 
