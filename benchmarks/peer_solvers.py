@@ -30,6 +30,17 @@ INFINITE = 2e19  # what IPOPT and its kin take for no bound
 NEAR = 1e-9
 # Bounds on the products that drive the relaxation of solvers that have none of their own.
 RELAXATIONS = (1e-3, 1e-5, RELAXATION)
+# What SNOPT's commonest codes mean.
+SNOPT_WORDS = {
+    1: "optimality conditions satisfied",
+    3: "feasible, but not as accurate as asked for",
+    13: "nonlinear infeasibilities minimized",
+    31: "iteration limit",
+    32: "major iteration limit",
+    34: "time limit",
+    41: "current point cannot be improved",
+    43: "cannot satisfy the general constraints",
+}
 
 
 def first_guess(problem: PeerProblem) -> FloatArray:
@@ -210,7 +221,8 @@ def snopt(request: GaitRequest, time_limit: float) -> Score:
         variables = program.NewContinuousVariables(problem.size)
         _add_blocks(program, variables, problem, problem.free_contacts(relaxation))
         result = solver.Solve(program, x, options)
-        x, status = result.GetSolution(variables), f"INFO {result.get_solver_details().info}"
+        x, code = result.GetSolution(variables), result.get_solver_details().info
+        status = f"INFO {code}: {SNOPT_WORDS.get(code, 'see its manual')}"
     return _score(clock, problem, x, status)
 
 
