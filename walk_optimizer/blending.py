@@ -1,41 +1,8 @@
-"""Steps between paces that blend references: smooth, but solved by nobody, and so without a certificate."""
+"""Steps that blend one pace into another: smooth, but solved by nobody, and so without a certificate."""
 
-import math
-
-import numpy as np
-from numpy.typing import NDArray
-
-from walk_optimizer.model.kinematics import HIP_Y, KNEE_1, KNEE_2
 from walk_optimizer.profile import StepProfile, StepSample
+from walk_optimizer.stand import ArrivalProfile, StandProfile
 from walk_optimizer.walk import StepPlan
-
-FloatArray = NDArray[np.float64]
-
-
-class Stand:
-    """Both feet below the hip, legs straight, at rest, without torques; it has no end of its own."""
-
-    method = "stand"
-    step_length = 0.0
-
-    def __init__(self, leg_length: float, duration: float = math.inf) -> None:
-        """Stand.
-
-        Args:
-            leg_length: Of a stretched leg in [m].
-            duration: In [s].
-        """
-        q = np.zeros(6)
-        q[HIP_Y], q[[KNEE_1, KNEE_2]] = leg_length, math.pi
-        zero = np.zeros(6)
-        for array in (q, zero):
-            array.setflags(write=False)
-        self._sample = StepSample(q, zero, zero[:3])
-        self.step_time = duration
-
-    def sample(self, time: float) -> StepSample:  # noqa: ARG002  # it is the same at all times
-        """Return the walker at any time."""
-        return self._sample
 
 
 class JoinedStep:
@@ -83,15 +50,14 @@ class JoinedStep:
         return StepSample(target.q + q, target.qdot + qdot, target.u)
 
 
-def blended(begins: StepProfile, leads_to: StepProfile, leg_length: float) -> StepPlan:
+def blended(begins: StepProfile, leads_to: StepProfile) -> StepPlan:
     """Return one step that blends a pace into another.
 
     Args:
         begins: The pace that is left, at the start of a step of it.
         leads_to: The pace that follows; a stand is reached after the time of a step of the former pace.
-        leg_length: Of a stretched leg in [m].
     """
-    begin = begins.sample(0.0)
-    standing = math.isinf(leads_to.step_time)
-    target = Stand(leg_length, begins.step_time) if standing else leads_to
-    return StepPlan(begins, (JoinedStep(target, begin),), leads_to)
+    target = leads_to
+    if isinstance(leads_to, StandProfile):
+        target = ArrivalProfile(leads_to.standing, begins.step_time)
+    return StepPlan(begins, (JoinedStep(target, begins.sample(0.0)),), leads_to)

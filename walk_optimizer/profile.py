@@ -56,8 +56,13 @@ def relabelled(q: FloatArray, step_length: float) -> FloatArray:
 
 
 def join_error(before: StepProfile, after: StepProfile) -> float:
-    """Return how far a step begins from where the one before it ends, at most, in [m] or [rad]."""
-    end = relabelled(before.sample(before.step_time).q, before.step_length)
+    """Return how far a step begins from where the one before it ends, at most, in [m] or [rad].
+
+    What has no end of its own is no step: it is left as it is, the legs keep their names.
+    """
+    end = before.sample(before.step_time).q
+    if math.isfinite(before.step_time):
+        end = relabelled(end, before.step_length)
     return float(np.max(np.abs(after.sample(0.0).q - end)))
 
 

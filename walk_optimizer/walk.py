@@ -2,7 +2,8 @@
 
 What can go on without end, a gait that repeats its step or a stand, is a *pace* here. A `StepPlan` is the
 steps from one pace to another. A walk keeps its pace until it has both another goal and a plan that leads
-there from where it is; it leaves a gait at the end of a step, and a stand at once.
+there from where it is; it leaves a gait at the end of a step, and a stand at once. A stand is no step: it
+has no end, and the legs keep their names where it is left.
 """
 
 import math
@@ -139,9 +140,12 @@ class Walk:
 
     def _next_step(self) -> None:
         ended = self._current
-        self._time = 0.0 if math.isinf(ended.step_time) else self._time - ended.step_time
-        self._step += 1
-        self._origin += ended.step_length
+        if math.isinf(ended.step_time):
+            self._time = 0.0
+        else:
+            self._time -= ended.step_time
+            self._step += 1
+            self._origin += ended.step_length
         with self._lock:
             if not self._remaining and self._plan is not None:
                 self._remaining.extend(self._plan.steps)

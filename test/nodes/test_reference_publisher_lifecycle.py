@@ -13,11 +13,13 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from walk_optimizer_interfaces.srv import StartRecording
 
+from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.recording import describe_bag
+from walk_optimizer.transition.standing import standing_pose
 
 pytestmark = pytest.mark.ros
 
-STANDING = [0.0, pytest.approx(3.14159265), 0.0, pytest.approx(3.14159265)]
+STANDING = pytest.approx(list(standing_pose(WalkerParameters(), 0.10, 0.05).q[2:]))
 
 
 def change(graph, transition):
@@ -31,7 +33,7 @@ def state(graph):
 
 def test_a_manager_decides_when_references_are_streamed(graph, start, stocked, tmp_path):
     start("gait_library", **stocked)
-    node = start(NODE, autostart=False, longest_gap=10.0)
+    node = start(NODE, autostart=False, longest_gap=10.0, transitions="blended")
     assert state(graph) == "unconfigured"
     assert change(graph, Transition.TRANSITION_CONFIGURE)
     walker = Walker(graph)
@@ -79,7 +81,7 @@ def test_two_walkers_in_one_graph_walk_each_for_itself(graph, start, stocked):
     names = ("one", "two")
     for name in names:
         start("gait_library", namespace=name, **stocked)
-        start(NODE, namespace=name, longest_gap=10.0, rate=100.0)
+        start(NODE, namespace=name, longest_gap=10.0, rate=100.0, transitions="blended")
     one, two = (Walker(graph, name) for name in names)
     joints = [walker.listen(JointState, "joint_reference") for walker in (one, two)]
     one.talk(Float64, "target_speed").publish(Float64(data=SLOW))

@@ -3,12 +3,13 @@
 import numpy as np
 from library.made_up_gait import made_up_gait, with_refinement
 
-from walk_optimizer.blending import Stand
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.profile import profile_of
+from walk_optimizer.stand import StandProfile
+from walk_optimizer.transition.standing import standing_pose
 
-LEG_LENGTH = WalkerParameters().leg_length
-STAND = Stand(LEG_LENGTH)
+STANDING = standing_pose(WalkerParameters(), 0.1, 0.05)
+STAND = StandProfile(STANDING)
 SLOW = profile_of(with_refinement(made_up_gait(points=20), intervals=20))
 FAST = profile_of(with_refinement(made_up_gait(speed=0.8, points=30, torque=3.0), intervals=20))
 

@@ -129,7 +129,7 @@ class DemoClient:
         self._references.clear()
         self.pause(seconds)
         assert self._gait is not None  # noqa: S101  # waited for above
-        return compare(self._references, self._gait)
+        return compare(self._references, self._gait, WalkerParameters.from_yaml())
 
     def _take_gait(self, message: GaitMessage) -> None:
         self._gait = message
@@ -152,9 +152,9 @@ class DemoClient:
         return answer
 
 
-def compare(references: list[JointState], message: GaitMessage) -> Reception:
+def compare(references: list[JointState], message: GaitMessage, walker: WalkerParameters) -> Reception:
     """Return how far received references are from a gait; names decide which joint is which."""
-    matcher = CycleMatcher(StreamedGait.from_message(message).profile)
+    matcher = CycleMatcher(StreamedGait.from_message(message, walker).profile)
     matches = []
     for reference in references:
         rows = [list(reference.name).index(joint) for joint in JOINTS]

@@ -11,11 +11,12 @@ from walk_optimizer.nodes.bag import RecordedTopic, StreamBag
 from walk_optimizer.nodes.pacer import Pacer
 from walk_optimizer.nodes.qos import LATCHED, STREAM
 from walk_optimizer.nodes.stream_messages import StreamFormat, StreamMessages
-from walk_optimizer.nodes.streamed_gait import StreamedGait
+from walk_optimizer.nodes.streamed_gait import Goal, StreamedGait
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.walk_report import WalkReport
 from walk_optimizer.phase_clock import PhaseClock
 from walk_optimizer.profile import StepProfile
+from walk_optimizer.stand import StandProfile
 from walk_optimizer.tick_statistics import Punctuality
 from walk_optimizer.walk import StepPlan, Walk
 
@@ -51,6 +52,12 @@ class JointStream:
         return self._known.get(self.walk.pace)
 
     @property
+    def pace(self) -> Goal:
+        """The gait or the stand that is kept, or that the running steps lead to."""
+        pace = self.walk.pace
+        return pace if isinstance(pace, StandProfile) else self._known[pace]
+
+    @property
     def report(self) -> WalkReport | None:
         """What was last published on ~/state."""
         return self._report
@@ -64,7 +71,7 @@ class JointStream:
         """Return how punctual the stream was in about the last second; None before `start`."""
         return self._pacer.punctuality() if self._pacer is not None else None
 
-    def start(self, stand: StepProfile, rate: float) -> None:
+    def start(self, stand: StandProfile, rate: float) -> None:
         """Begin to publish a walk that stands.
 
         Args:
@@ -85,19 +92,20 @@ class JointStream:
             self._pacer.stop()
         self._pacer = None
 
-    def follow(self, plan: StepPlan, gait: StreamedGait | None) -> bool:
+    def follow(self, plan: StepPlan, goal: Goal) -> bool:
         """Take a plan from the end of the running step on.
 
         Args:
             plan: Steps to another pace.
-            gait: What it leads to; None for a stand.
+            goal: What it leads to.
 
         Returns:
             Whether the plan begins at the present pace; if not, nothing has changed.
         """
-        kept = (self.gait, self._known.get(self.walk.goal), gait)
+        kept = [self._known.get(profile) for profile in (self.walk.pace, self.walk.goal)]
+        gaits = [one for one in (*kept, goal) if isinstance(one, StreamedGait)]
         # Replaced as a whole, for the stream's thread; former gaits are forgotten.
-        self._known = {one.profile: one for one in kept if one is not None}
+        self._known = {gait.profile: gait for gait in gaits}
         return self.walk.follow(plan)
 
     def announce_again(self) -> None:

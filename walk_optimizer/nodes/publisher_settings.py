@@ -13,6 +13,8 @@ from walk_optimizer.recording import Compression, RecorderSettings
 from walk_optimizer.references import JOINTS
 from walk_optimizer.request import GaitRequest
 
+CERTIFIED, BLENDED = "certified", "blended"
+
 
 def _check_speed(speed: float) -> None:
     if speed != 0:
@@ -112,6 +114,22 @@ SETTINGS = [
     ),
     Setting("frame_id", "base_link", "Frame in the header of ~/joint_reference."),
     WALKER_FILE,
+    Setting(
+        "transitions",
+        CERTIFIED,
+        f"{CERTIFIED}: speeds change by steps that are solved for and certified, or not at all. {BLENDED}: "
+        "by one step that blends the references, at once; smooth, but no walker can follow it exactly.",
+        check=_one_of((CERTIFIED, BLENDED)),
+    ),
+    Setting(
+        "transition_time_limit", 120.0, "Longest solve for the steps between two gaits [s].", 1.0, 3600.0
+    ),
+    Setting(
+        "cache_folder",
+        "",
+        "Folder for steps between gaits that were solved; empty for the user's cache.",
+        read_only=True,
+    ),
     Setting(
         "library_service",
         "gait_library/get_gait",

@@ -11,7 +11,6 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 from walk_optimizer_interfaces.srv import GetGait, GetJointTrajectory, SetGait
 
-from walk_optimizer.blending import Stand
 from walk_optimizer.errors import GaitNotFoundError, WalkOptimizerError
 from walk_optimizer.nodes.bag import StreamBag
 from walk_optimizer.nodes.cycle_message import cycle_to_message
@@ -28,6 +27,7 @@ from walk_optimizer.nodes.publisher_settings import (
 from walk_optimizer.nodes.recording_control import RecordingControl
 from walk_optimizer.nodes.running import run_node
 from walk_optimizer.nodes.speed_commands import SpeedCommands
+from walk_optimizer.nodes.transition_planner import TransitionPlanner
 from walk_optimizer.nodes.walk_commands import SupersededError, WalkCommands
 from walk_optimizer.nodes.walker_setting import walker_of
 from walk_optimizer.phase_clock import Motion
@@ -54,15 +54,16 @@ class ReferencePublisherNode(ManagedNode):
 
     def configure(self) -> None:
         """Create topics and services."""
-        self._leg_length = walker_of(self.parameters["walker_file"]).leg_length
+        walker = walker_of(self.parameters["walker_file"])
         self._bag = StreamBag()
         self._stream = JointStream(self, self._bag)
         library = self.connect(GetGait, self.parameters["library_service"])
-        self._commands = WalkCommands(self, self._stream, library)
+        planner = TransitionPlanner(self)
+        self._commands = WalkCommands(self, self._stream, planner, library, walker)
         self._speeds = SpeedCommands(self, self._commands)
         self._recording = RecordingControl(self, self._bag, self._stream)
         health = PublisherHealth(self.diagnostics, self._stream, self._speeds, self._bag)
-        for end in (health.close, self._recording.close, self._stream.stop):
+        for end in (planner.close, health.close, self._recording.close, self._stream.stop):
             self._undo.callback(end)
         self.serve(SetGait, "~/set_gait", self._set_gait)
         self.serve(GetJointTrajectory, "~/joint_trajectory", self._joint_trajectory)
@@ -71,9 +72,7 @@ class ReferencePublisherNode(ManagedNode):
 
     def activate(self) -> None:
         """Stream a stand, and do what the parameters ask for from the start."""
-        stand = Stand(self._leg_length)
-        self._stream.start(stand, self.parameters["rate"])
-        self._commands.begin(stand, self._leg_length)
+        self._stream.start(self._commands.begin(), self.parameters["rate"])
         self._put_into_effect({setting.name for setting in SETTINGS})
         if self.parameters["initial_speed"] != 0:
             self.later(self._walk_from_the_start)
@@ -97,7 +96,7 @@ class ReferencePublisherNode(ManagedNode):
 
     async def _stop(self, _request: Trigger.Request, response: Trigger.Response) -> None:
         self._speeds.forget()
-        response.message = await self._commands.stop()
+        response.message = self._commands.stop()
         self.get_logger().info(response.message)
 
     async def _pause(self, _request: Trigger.Request, response: Trigger.Response) -> None:

@@ -117,10 +117,8 @@ class SpeedCommands:
 
     async def _carry_out(self, target: _Target) -> None:
         try:
-            if target.request is None:
-                text = await self._commands.stop()
-            else:
-                text = await self._commands.walk_at(target.request)
+            request = target.request
+            text = self._commands.stop() if request is None else await self._commands.walk_at(request)
         except SupersededError:
             return
         except WalkOptimizerError as error:

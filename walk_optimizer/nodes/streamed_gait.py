@@ -1,13 +1,19 @@
-"""A gait as the stream needs it."""
+"""Gaits and stands as the stream needs them."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from walk_optimizer_interfaces.msg import Gait as GaitMessage
+from walk_optimizer_interfaces.msg import SolverReport
 
 from walk_optimizer.errors import SolveFailedError
-from walk_optimizer.model.parameters import KneeSpring
-from walk_optimizer.nodes.conversions import refined_from_message, trajectory_from_message
-from walk_optimizer.profile import EulerProfile, StepProfile, most_accurate
+from walk_optimizer.gait import Gait
+from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.nodes.conversions import gait_from_message, request_of_message
+from walk_optimizer.profile import RefinedProfile, StepProfile, profile_of
+from walk_optimizer.solve.status import Status
+from walk_optimizer.stand import StandProfile
+from walk_optimizer.transition.paces import Pace
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,29 +23,39 @@ class StreamedGait:
     Attributes:
         message: As it is announced.
         profile: As it is walked.
-        spring: Of both knees, for what is walked.
+        gait: As it was solved.
     """
 
     message: GaitMessage
     profile: StepProfile
-    spring: KneeSpring
+    gait: Gait
 
     @classmethod
-    def from_message(cls, message: GaitMessage) -> "StreamedGait":
+    def from_message(cls, message: GaitMessage, walker: WalkerParameters) -> "StreamedGait":
         """Return the gait of a message; its refined part is walked if that is certified.
+
+        Args:
+            message: The gait.
+            walker: That it was solved for.
 
         Raises:
             GaitFileError: its arrays don't fit.
+            InvalidRequestError: its step is no step that can be asked for.
             SolveFailedError: it is not certified.
         """
         if not message.certificate.certified:
             raise SolveFailedError("only certified gaits are streamed; this one is not")
-        euler = EulerProfile(trajectory_from_message(message), message.step_length, message.step_time)
-        refined = refined_from_message(message)
-        profile = most_accurate(euler, refined)
-        if refined is None or profile is euler:
-            return cls(message, profile, KneeSpring(message.stiffness, message.equilibrium))
-        return cls(message, profile, refined.spring)
+        report = SolverReport(status=Status.SOLVED.value)
+        gait = gait_from_message(message, report, walker, request_of_message(message))
+        return cls(message, profile_of(gait), gait)
+
+    @property
+    def spring(self) -> KneeSpring:
+        """Knee spring of what is walked."""
+        refined = self.gait.refined
+        if refined is None or not isinstance(self.profile, RefinedProfile):
+            return self.gait.spring
+        return refined.spring
 
     @property
     def speed(self) -> float:
@@ -49,3 +65,17 @@ class StreamedGait:
     def __str__(self) -> str:
         """Return the speed that is walked, and by the solution of which method."""
         return f"{self.speed:.4f} m/s ({self.profile.method})"
+
+
+# What a walk is to lead to.
+Goal: TypeAlias = StreamedGait | StandProfile
+
+
+def profile_of_goal(goal: Goal) -> StepProfile:
+    """Return how a goal is walked."""
+    return goal if isinstance(goal, StandProfile) else goal.profile
+
+
+def pace_of_goal(goal: Goal) -> Pace:
+    """Return what transitions lead from and to."""
+    return goal.standing if isinstance(goal, StandProfile) else goal.gait

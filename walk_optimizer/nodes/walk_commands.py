@@ -1,20 +1,21 @@
 """From commands to steps: which speed is to be walked, and how the walk gets there."""
 
-from typing import Any
-
 from walk_optimizer_interfaces.srv import GetGait
 
-from walk_optimizer.blending import blended
 from walk_optimizer.errors import GaitNotFoundError, WalkOptimizerError
 from walk_optimizer.joint_limits import JointLimits, peaks_of
+from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.lifecycle import ManagedNode
 from walk_optimizer.nodes.remote_service import RemoteService
 from walk_optimizer.nodes.streamed_gait import StreamedGait
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
+from walk_optimizer.nodes.transition_planner import TransitionPlanner
 from walk_optimizer.phase_clock import Motion
-from walk_optimizer.profile import StepProfile
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.stand import StandProfile
+from walk_optimizer.transition.settings import transition_settings
+from walk_optimizer.transition.standing import standing_pose
 
 # Before the library is up, it is tried again after this time in [s].
 _RETRY_PERIOD = 1.0
@@ -35,27 +36,35 @@ class WalkCommands:
     from, nor the stream. Everything here runs in the node's executor.
     """
 
-    def __init__(self, node: ManagedNode, stream: JointStream, library: RemoteService) -> None:
+    def __init__(
+        self,
+        node: ManagedNode,
+        stream: JointStream,
+        planner: TransitionPlanner,
+        library: RemoteService,
+        walker: WalkerParameters,
+    ) -> None:
         """Begin without a command.
 
         Args:
             node: That asks the library.
             stream: That walks.
-            library: RemoteService of its service.
+            planner: Of the steps between paces.
+            library: Its service.
+            walker: That walks.
         """
-        self._node, self._stream, self._library = node, stream, library
+        self._node, self._stream, self._planner, self._library = node, stream, planner, library
+        self._walker = walker
+        settings = transition_settings()
+        self._standing = standing_pose(walker, settings.feet_distance, settings.knee_bend)
         self.limits = JointLimits()
         self._newest = 0
 
-    def begin(self, stand: StepProfile, leg_length: float) -> None:
-        """Take commands for a stream that has just begun with a stand.
-
-        Args:
-            stand: What a stop leads to.
-            leg_length: Of a stretched leg in [m].
-        """
-        self._stand, self._leg_length = stand, leg_length
+    def begin(self) -> StandProfile:
+        """Return what the stream begins with."""
+        stand = StandProfile(self._standing)
         self._peaks = peaks_of([stand])
+        return stand
 
     def require_met(self, limits: JointLimits) -> None:
         """Refuse limits that what is walked now does not meet.
@@ -68,36 +77,40 @@ class WalkCommands:
     async def walk_at(self, request: GaitRequest, wait_for_library: bool = False) -> str:
         """Have a gait walked, and return a sentence about it.
 
+        Nothing is begun that could not be stopped: the steps to a stand are planned before.
+
         Args:
             request: The gait.
             wait_for_library: Whether a library that is not there yet is waited for.
 
         Raises:
-            WalkOptimizerError: there is no such gait, the joints can't do it, or it was superseded.
+            WalkOptimizerError: there is no such gait or no way to it, the joints can't do it, or a later
+                command came first.
         """
         self._require_no_emergency()
         order = self._take_order()
-        while True:
-            try:
-                gait = await self._fetch(request)
-                break
-            except ServiceUnavailableError:
-                if not wait_for_library:
-                    raise
-            self._require_newest(order)
-            self._node.get_logger().warning("waiting for the library", throttle_duration_sec=10.0)
-            await self._node.sleep(_RETRY_PERIOD)
+        gait = await self._fetch(request, order if wait_for_library else None)
+        self._require_newest(order)
         peaks = peaks_of([gait.profile])
         self.limits.require(peaks)
-        await self._lead_to(gait.profile, gait, order)
+        await self._planner.plan(gait, self._stand_after(gait), self._torque_limit)
+        await self._lead_to(gait, order)
         self._peaks = peaks
         return f"{gait} from the next step on"
 
-    async def stop(self) -> str:
-        """Have the walk come to a stand, and return a sentence about it."""
-        await self._lead_to(self._stand, None, self._take_order())
-        self._peaks = peaks_of([self._stand])
-        return "comes to a stand after the running step"
+    def stop(self) -> str:
+        """Have the walk come to a stand, and return a sentence about it; it waits for nothing."""
+        self._take_order()
+        pace = self._stream.pace
+        while isinstance(pace, StreamedGait):
+            stand = self._stand_after(pace)
+            plan = self._planner.plan_at_once(pace, stand, self._torque_limit)
+            if self._stream.follow(plan, stand):
+                self._peaks = peaks_of([stand])
+                return "comes to a stand after the running step"
+            pace = self._stream.pace
+        self._stream.walk.stay(pace)
+        return "stands already, or is about to"
 
     def _require_no_emergency(self) -> None:
         if self._stream.walk.clock.motion is Motion.EMERGENCY_STOP:
@@ -105,6 +118,7 @@ class WalkCommands:
 
     def _take_order(self) -> int:
         """Return the number of a command; those with lower numbers don't count any more."""
+        self._planner.give_up()
         self._newest += 1
         return self._newest
 
@@ -112,25 +126,51 @@ class WalkCommands:
         if order != self._newest:
             raise SupersededError("a later command came first")
 
-    async def _fetch(self, request: GaitRequest) -> StreamedGait:
+    async def _fetch(self, request: GaitRequest, waiting_as: int | None) -> StreamedGait:
         """Return a gait of the library.
+
+        Args:
+            request: The gait.
+            waiting_as: Number of a command that waits for a library that is not there yet.
 
         Raises:
             WalkOptimizerError: the library refused, or is not there.
         """
         wanted = GetGait.Request(speed=request.speed, spring_mode=request.spring_mode.value)
-        timeout: Any = self._node.parameters["library_timeout"]
-        answer = await self._node.call(self._library, wanted, timeout)
+        while True:
+            try:
+                timeout = self._node.parameters["library_timeout"]
+                answer = await self._node.call(self._library, wanted, timeout)
+                break
+            except ServiceUnavailableError:
+                if waiting_as is None:
+                    raise
+            self._require_newest(waiting_as)
+            self._node.get_logger().warning("waiting for the library", throttle_duration_sec=10.0)
+            await self._node.sleep(_RETRY_PERIOD)
         if not answer.success:
             raise GaitNotFoundError(answer.message)
-        return StreamedGait.from_message(answer.gait)
+        return StreamedGait.from_message(answer.gait, self._walker)
 
-    async def _lead_to(self, goal: StepProfile, gait: StreamedGait | None, order: int) -> None:
-        """Have the stream walk to another pace from the one that it then has."""
+    async def _lead_to(self, goal: StreamedGait, order: int) -> None:
+        """Have the stream walk to a gait from the pace that it then has."""
         while True:
+            pace = self._stream.pace
+            if isinstance(pace, StreamedGait) and pace.message == goal.message:
+                # The same gait again: another copy would only cost a transition to itself.
+                if self._stream.walk.stay(pace.profile):
+                    return
+                continue
+            plan = await self._planner.plan(pace, goal, self._torque_limit)
             self._require_newest(order)
-            if self._stream.walk.stay(goal):
+            self.limits.require(peaks_of(plan.steps))
+            if self._stream.follow(plan, goal):
                 return
-            plan = blended(self._stream.walk.pace, goal, self._leg_length)
-            if self._stream.follow(plan, gait):
-                return
+
+    def _stand_after(self, gait: StreamedGait) -> StandProfile:
+        """Return the stand that a gait is stopped in: its knee springs stay as they are."""
+        return StandProfile(self._standing.on(gait.spring))
+
+    @property
+    def _torque_limit(self) -> float:
+        return min(self.limits.torque)

@@ -1,0 +1,151 @@
+"""Plans the steps between paces in a process of its own: they may take long, and the stream never waits."""
+
+from collections import OrderedDict
+from pathlib import Path
+from typing import TypeAlias
+
+from walk_optimizer.blending import blended
+from walk_optimizer.errors import InvalidRequestError, SolveFailedError, WalkOptimizerError
+from walk_optimizer.gait import RefinedGait
+from walk_optimizer.nodes.publisher_settings import BLENDED
+from walk_optimizer.nodes.streamed_gait import Goal, pace_of_goal, profile_of_goal
+from walk_optimizer.nodes.suite_node import SuiteNode
+from walk_optimizer.profile import RefinedProfile
+from walk_optimizer.solve.worker import BusyError, WorkerPool
+from walk_optimizer.solve.worker_task import Ticket
+from walk_optimizer.stand import StandProfile
+from walk_optimizer.transition.paces import Pace, border_state, pace_name, spring_of
+from walk_optimizer.transition.standing import Standing
+from walk_optimizer.transition_job import TransitionJob, transition_job
+from walk_optimizer.walk import StepPlan
+
+# Transitions that are kept in memory; they take about 100 kB each.
+_KEPT = 64
+_WORKERS = 1
+# Names and states of both ends, and the torque limit.
+_Key: TypeAlias = tuple[object, ...]
+
+
+class NoTransitionError(WalkOptimizerError):
+    """There are no certified steps between two paces."""
+
+
+class TransitionPlanner:
+    """Finds certified steps: in memory, in the user's cache, or by a solve in a worker process.
+
+    Owns the process. Does not own what a solve is (`transition_job`), nor what is walked.
+    """
+
+    def __init__(self, node: SuiteNode) -> None:
+        """Begin without a process.
+
+        Args:
+            node: Whose parameters count, and whose executor waits.
+        """
+        self._node = node
+        self._known: OrderedDict[_Key, tuple[RefinedGait, ...]] = OrderedDict()
+        self._pool: WorkerPool | None = None
+        self._ticket: Ticket | None = None
+
+    def close(self) -> None:
+        """End the process."""
+        if self._pool is not None:
+            self._pool.close()
+        self._pool = None
+
+    def give_up(self) -> None:
+        """Cancel what is being solved: nobody wants it any more."""
+        if self._ticket is not None:
+            self._ticket.cancel()
+
+    async def plan(self, begins: Goal, leads_to: Goal, torque_limit: float) -> StepPlan:
+        """Return the steps from one pace to another.
+
+        Args:
+            begins: The pace that is left.
+            leads_to: The pace that follows.
+            torque_limit: Largest torque in [N m]; may be infinite.
+
+        Raises:
+            NoTransitionError: certified steps are wanted, and there are none.
+        """
+        if self._node.parameters["transitions"] == BLENDED:
+            return blended(profile_of_goal(begins), profile_of_goal(leads_to))
+        try:
+            steps = await self._steps(begins, leads_to, torque_limit)
+        except (InvalidRequestError, SolveFailedError, BusyError) as error:
+            raise NoTransitionError(
+                f"no certified steps from {_name(begins)} to {_name(leads_to)}: {error}; "
+                "try a nearer speed, or set transitions to blended"
+            ) from error
+        return _plan(begins, leads_to, steps)
+
+    def plan_at_once(self, begins: Goal, leads_to: Goal, torque_limit: float) -> StepPlan:
+        """Return steps that are known already, or blended ones: for stops, which wait for nothing."""
+        try:
+            steps = self._known.get(_key(begins, leads_to, torque_limit), ())
+        except InvalidRequestError:
+            steps = ()
+        if steps:
+            return _plan(begins, leads_to, steps)
+        return blended(profile_of_goal(begins), profile_of_goal(leads_to))
+
+    async def _steps(self, begins: Goal, leads_to: Goal, torque_limit: float) -> tuple[RefinedGait, ...]:
+        """Return certified steps.
+
+        Raises:
+            InvalidRequestError: there can't be any, whatever is computed.
+            SolveFailedError: none were found.
+            BusyError: the process is ending.
+        """
+        key = _key(begins, leads_to, torque_limit)
+        if key not in self._known:
+            self._known[key] = await self._solve(begins, leads_to, torque_limit)
+        self._known.move_to_end(key)
+        while len(self._known) > _KEPT:
+            self._known.popitem(last=False)
+        return self._known[key]
+
+    async def _solve(self, begins: Goal, leads_to: Goal, torque_limit: float) -> tuple[RefinedGait, ...]:
+        source, target = _paces(begins, leads_to)
+        folder, limit = self._node.parameters["cache_folder"], self._node.parameters["transition_time_limit"]
+        job = TransitionJob(
+            source=source,
+            target=target,
+            torque_limit=torque_limit,
+            time_limit=limit,
+            folder=Path(folder) if folder else None,
+        )
+        if self._pool is None:
+            self._pool = WorkerPool(transition_job, _WORKERS)
+        self._ticket = ticket = self._pool.submit(job, limit)
+        await self._node.finished(ticket.future)
+        answer = ticket.future.result()
+        if answer.problem:
+            self._node.get_logger().warning(f"transition cache: {answer.problem}")
+        if not answer.steps:
+            raise SolveFailedError(answer.message)
+        self._node.get_logger().debug(f"{_name(begins)} to {_name(leads_to)}: {answer.message}")
+        return tuple(answer.steps)
+
+
+def _key(begins: Goal, leads_to: Goal, torque_limit: float) -> _Key:
+    source, target = _paces(begins, leads_to)
+    ends = [(pace_name(pace), border_state(pace).tobytes()) for pace in (source, target)]
+    return (*ends, torque_limit)
+
+
+def _paces(begins: Goal, leads_to: Goal) -> tuple[Pace, Pace]:
+    """Return what a solve leads from and to; a stand is left with the knee springs of what follows."""
+    source, target = pace_of_goal(begins), pace_of_goal(leads_to)
+    return (source.on(spring_of(target)) if isinstance(source, Standing) else source), target
+
+
+def _plan(begins: Goal, leads_to: Goal, steps: tuple[RefinedGait, ...]) -> StepPlan:
+    profiles = tuple(RefinedProfile.of(step) for step in steps)
+    return StepPlan(profile_of_goal(begins), profiles, profile_of_goal(leads_to))
+
+
+def _name(goal: Goal) -> str:
+    """Return a goal in words."""
+    return "a stand" if isinstance(goal, StandProfile) else f"{goal.speed:.4f} m/s"

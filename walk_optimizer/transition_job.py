@@ -1,0 +1,77 @@
+"""Transitions as jobs of a worker process: the solved ones of the table, or solved now and put there."""
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from walk_optimizer.errors import GaitFileError
+from walk_optimizer.gait import RefinedGait
+from walk_optimizer.solve.status import ProgressCallback
+from walk_optimizer.transition.paces import Pace
+from walk_optimizer.transition.solve import plan_transition
+from walk_optimizer.transition.table import TransitionTable
+
+# Of the worker: what runs beside it, above all a stream of references, goes first.
+_NICENESS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class TransitionJob:
+    """A request as it travels to a worker process.
+
+    Attributes:
+        source: What is left.
+        target: What is reached.
+        torque_limit: Largest torque in [N m]; may be infinite.
+        time_limit: In [s].
+        folder: Where transitions that are solved are kept; None for the user's cache.
+    """
+
+    source: Pace
+    target: Pace
+    torque_limit: float
+    time_limit: float
+    folder: Path | None
+
+
+@dataclass(frozen=True, eq=False)
+class TransitionAnswer:
+    """What a job led to.
+
+    Attributes:
+        steps: The certified steps; empty where there are none.
+        message: How the solve went.
+        problem: Why solved steps could not be kept or used; empty if they could.
+    """
+
+    steps: tuple[RefinedGait, ...]
+    message: str
+    problem: str = ""
+
+
+def transition_job(job: TransitionJob, progress: ProgressCallback) -> TransitionAnswer:
+    """Do a job, in the worker process."""
+    os.setpriority(os.PRIO_PROCESS, 0, _NICENESS)
+    table = TransitionTable(job.source.walker, job.folder)
+    known = table.find(job.source, job.target)
+    if known is not None and known.peak_torques.max() <= job.torque_limit:
+        return TransitionAnswer(known.steps, "from the table")
+    outcome = plan_transition(
+        job.source.walker,
+        job.source,
+        job.target,
+        torque_limit=job.torque_limit,
+        time_limit=job.time_limit,
+        progress=progress,
+    )
+    problems = table.problems()
+    if outcome.transition is None:
+        return TransitionAnswer((), outcome.report.message, "; ".join(problems))
+    # A file is named by its paces alone: steps that a limit has changed are not kept.
+    if math.isinf(job.torque_limit):
+        try:
+            table.store(outcome.transition)
+        except GaitFileError as error:
+            problems.append(str(error))
+    return TransitionAnswer(outcome.transition.steps, outcome.report.message, "; ".join(problems))
