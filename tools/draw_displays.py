@@ -45,7 +45,12 @@ from walk_optimizer.nodes.qos import LATCHED, STREAM
 FloatArray = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parent.parent
-NODES = ("gait_optimizer", "gait_library", "reference_publisher", "walker_visualizer")
+# The nodes and their parameters: how the walk begins is not in the picture, so nothing is solved for it.
+NODES = {
+    "gait_library": (),
+    "reference_publisher": ("-p", "transitions:=blended"),
+    "walker_visualizer": (),
+}
 SPEED, MODE = 0.5338, "stiffness_and_equilibrium"
 # Room for the recorder to stall, so that plots have no gaps of its making.
 DEEP = QoSProfile(depth=5000)
@@ -121,7 +126,8 @@ def running() -> Iterator[None]:
     nodes: list[NodeProcess] = []
     with tempfile.TemporaryDirectory() as logs:
         try:
-            nodes += [NodeProcess(name, Path(logs) / f"{name}.log", environment=os.environ) for name in NODES]
+            for name, parameters in NODES.items():
+                nodes.append(NodeProcess(name, Path(logs) / f"{name}.log", parameters, os.environ))
             yield
         finally:
             for node in nodes:
