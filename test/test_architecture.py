@@ -86,6 +86,7 @@ def test_imports_run_downwards(path):
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_only_the_nodes_know_ros(path):
     ros = {"rclpy", "std_msgs", "sensor_msgs", "trajectory_msgs", "walk_optimizer_interfaces", "launch"}
+    ros |= {"geometry_msgs", "tf2_msgs", "visualization_msgs"}
     allowed = own_top(path) in {"nodes", "recording"} or path == ROOT / "cli" / "demo.py"
     if not allowed:
         assert not {name.split(".")[0] for name in imports_of(path)} & ros
