@@ -208,12 +208,14 @@ def test_the_bag_holds_what_was_streamed(graph, publisher, tmp_path):
     assert (again.success, "already recording" in again.message) == (False, True)
     assert graph.get_parameter(NODE, "record").bool_value
     begin = len(joints)
-    graph.spin_until(lambda: len(joints) > begin + 100, "references")
+    graph.spin_until(lambda: len(joints) > begin + 200, "references")
     stopped = graph.call(StopRecording, f"{NODE}/stop_recording")
     assert stopped.success, stopped.message
     graph.spin_for(0.2)
 
     bag = read_bag(tmp_path / "bag")
+    own = {"joint_reference", "feedforward_torques", "commands", "gait", "knee_spring", "state"}
+    assert set(bag) == {f"/{NODE}/{name}" for name in own} | {"/gait_library/table", "/diagnostics"}
     recorded = bag[f"/{NODE}/joint_reference"]
     assert sum(map(len, bag.values())) == stopped.messages
     (gait,) = bag[f"/{NODE}/gait"]

@@ -1,14 +1,16 @@
-"""`bag info` and `bag repair`: what the recorder left, without ROS."""
+"""`bag info`, `bag repair` and `bag play`: what the recorder left; only playing needs ROS."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from walk_optimizer.cli.arguments import Subparsers, add_verb
+from walk_optimizer.errors import MissingDependencyError
 
 _TEXT = """\
-look into recorded bags, repair broken ones
+look into recorded bags, repair broken ones, play them
 
-Works on bag directories and on single .mcap files. Needs no ROS."""
+Works on bag directories and on single .mcap files. Only playing needs ROS."""
 
 _INFO = """\
 say what is in a bag and whether it is whole
@@ -20,6 +22,19 @@ _REPAIR = """\
 write a whole bag from what can be trusted of a damaged one
 
 The damaged bag stays as it is."""
+
+_PLAY = """\
+publish the messages of a bag again, for machines without rosbag2
+
+On their topics, with the recorded quality of service and timing, and never in a burst:
+a player that was held up goes on with the recorded distances. Needs ROS. Stamps inside
+of messages stay as they were."""
+
+_PLAY_EXAMPLES = """\
+examples:
+  walk-optimizer bag play recordings/walk_1
+  walk-optimizer bag play recordings/walk_1 --rate 0.5 --loop
+  walk-optimizer bag play recordings/walk_1 --topics /reference_publisher/joint_reference"""
 
 
 def add_parser(verbs: Subparsers) -> None:
@@ -33,6 +48,14 @@ def add_parser(verbs: Subparsers) -> None:
     repair.add_argument("bag", type=Path, help="bag directory or .mcap file")
     repair.add_argument("--output", type=Path, metavar="BAG", help="default: BAG_repaired beside it")
     repair.set_defaults(run=run_repair)
+    play = add_verb(actions, "play", _PLAY, _PLAY_EXAMPLES)
+    play.add_argument("bag", type=Path, help="bag directory or .mcap file")
+    play.add_argument(
+        "--rate", type=float, default=1.0, metavar="X", help="times the recorded speed (default: 1)"
+    )
+    play.add_argument("--loop", action="store_true", help="begin anew at the end, until Ctrl-C")
+    play.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these (default: all)")
+    play.set_defaults(run=run_play)
 
 
 def run_info(args: argparse.Namespace) -> int:
@@ -49,4 +72,20 @@ def run_repair(args: argparse.Namespace) -> int:
     from walk_optimizer.recording import repair_bag
 
     print(repair_bag(args.bag, args.output))
+    return 0
+
+
+def run_play(args: argparse.Namespace) -> int:
+    """Play a bag."""
+    from walk_optimizer.recording import describe_bag
+
+    info = describe_bag(args.bag)
+    if not info.is_whole:
+        print(f"{args.bag} is damaged: what can be trusted is played; `bag info` tells more", file=sys.stderr)
+    try:
+        from walk_optimizer.nodes.bag_player import play_bag
+    except ImportError as error:
+        raise MissingDependencyError(f"playing a bag needs ROS 2: {error}") from error
+    played = play_bag(args.bag, info, args.topics, args.rate, args.loop)
+    print(f"played {played.messages} messages on {played.topics} topics")
     return 0

@@ -67,8 +67,8 @@ class StreamBag:
         self.topics: list[RecordedTopic] = []
         self.recorder: Recorder | None = None
 
-    def start(self, directory: Path, settings: RecorderSettings) -> None:
-        """Begin a bag.
+    def start(self, directory: Path, settings: RecorderSettings) -> Recorder:
+        """Begin a bag and return its recorder.
 
         Raises:
             RecordingError: one is being recorded, or the bag can't be created.
@@ -80,6 +80,7 @@ class StreamBag:
             recorder.add_topic(topic.info)
         recorder.start()
         self.recorder = recorder
+        return recorder
 
     def stop(self) -> RecorderStatus:
         """Close the bag and return what is in it.

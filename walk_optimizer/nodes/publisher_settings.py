@@ -140,6 +140,18 @@ SETTINGS = [
         "library_timeout", 1000.0, "Longest wait for a gait, which may have to be solved [s].", 1.0, 86_400.0
     ),
     Setting("record", False, "Whether a bag is being recorded; set it to start and stop."),
+    Setting(
+        "recording_topics",
+        [
+            "gait_library/table",
+            "robot_description",
+            "tf",
+            "tf_static",
+            "walker_visualizer/markers",
+            "/diagnostics",
+        ],
+        "Topics of other nodes that are recorded beside the publisher's own, as soon as they are there.",
+    ),
     Setting("recording_folder", "", "Folder of new bags; empty for ~/.ros/walk_optimizer."),
     Setting(
         "recording_compression",

@@ -7,9 +7,11 @@ from walk_optimizer_interfaces.srv import StartRecording, StopRecording
 
 from walk_optimizer.errors import WalkOptimizerError
 from walk_optimizer.nodes.bag import StreamBag, new_bag_folder
+from walk_optimizer.nodes.foreign_topics import ForeignTopics
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.lifecycle import ManagedNode
 from walk_optimizer.nodes.publisher_settings import recorder_settings
+from walk_optimizer.recording.status import RecorderStatus
 
 
 class RecordingControl:
@@ -24,6 +26,7 @@ class RecordingControl:
             stream: That is recorded.
         """
         self._node, self._bag, self._stream = node, bag, stream
+        self._foreign: ForeignTopics | None = None
         node.serve(StartRecording, "~/start_recording", self._start)
         node.serve(StopRecording, "~/stop_recording", self._stop)
 
@@ -34,14 +37,14 @@ class RecordingControl:
             if wanted and not recording:
                 self._record()
             elif recording and not wanted:
-                self._node.get_logger().info(f"closed {self._bag.stop().directory}")
+                self.close()
         except WalkOptimizerError as error:
             self._node.get_logger().error(f"record: {error}")
 
     def close(self) -> None:
         """Close the bag, if there is one."""
         if self._bag.recorder is not None:
-            status = self._bag.stop()
+            status = self._end()
             self._node.get_logger().info(f"closed {status.directory} with {status.messages} messages")
 
     async def _start(self, request: StartRecording.Request, response: StartRecording.Response) -> None:
@@ -51,7 +54,7 @@ class RecordingControl:
         response.message = f"recording to {directory}"
 
     async def _stop(self, _request: StopRecording.Request, response: StopRecording.Response) -> None:
-        status = self._bag.stop()
+        status = self._end()
         self._show(False)
         response.directory, response.messages = str(status.directory), status.messages
         if status.error is not None:
@@ -62,10 +65,22 @@ class RecordingControl:
         """Begin a bag and return its directory."""
         parameters = self._node.parameters
         directory = directory or new_bag_folder(parameters["recording_folder"])
-        self._bag.start(directory, recorder_settings(parameters))
+        recorder = self._bag.start(directory, recorder_settings(parameters))
+        self._forget_foreign()  # Of a recording that has ended by itself.
+        self._foreign = ForeignTopics(self._node, parameters["recording_topics"], recorder)
         self._stream.announce_again()
         self._node.get_logger().info(f"recording to {directory}")
         return directory
+
+    def _end(self) -> RecorderStatus:
+        """Close the bag and return what is in it."""
+        self._forget_foreign()
+        return self._bag.stop()
+
+    def _forget_foreign(self) -> None:
+        if self._foreign is not None:
+            self._foreign.close()
+        self._foreign = None
 
     def _show(self, running: bool) -> None:
         """Make the parameter `record` say what a service did."""

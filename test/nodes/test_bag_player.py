@@ -1,0 +1,86 @@
+"""`walk-optimizer bag play`: a process of its own plays a bag to a subscriber."""
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+
+from rclpy.qos import QoSProfile
+from recording.samples import GAIT, JOINTS, PERIOD_NS, START_NS, number_of, string, topic
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from walk_optimizer.nodes.bag_player import qos_of
+from walk_optimizer.nodes.qos import LATCHED, STREAM
+from walk_optimizer.recording import BagWriter, QosProfile, RecorderSettings
+from walk_optimizer.recording.ros_messages import qos_profile
+
+pytestmark = pytest.mark.ros
+
+COUNT, RATE = 200, 0.5
+SLOW_READER = QoSProfile(depth=1000)
+
+
+@pytest.fixture
+def bag(tmp_path):
+    from recording.samples import joint_state
+
+    with BagWriter(tmp_path / "walk", RecorderSettings(min_free_bytes=0), topics=[JOINTS, GAIT]) as writer:
+        writer.write(GAIT.name, string("a gait"), START_NS)
+        for number in range(COUNT):
+            writer.write(JOINTS.name, joint_state(number), START_NS + number * PERIOD_NS)
+    return tmp_path / "walk"
+
+
+def play(bag, *arguments):
+    return subprocess.Popen(
+        [sys.executable, "-m", "walk_optimizer.cli.main", "bag", "play", str(bag), *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def test_a_bag_is_played_as_it_was_recorded_and_never_faster(graph, bag):
+    raw, times = [], []
+    graph.node.create_subscription(
+        JointState,
+        JOINTS.name,
+        lambda data: (raw.append(data), times.append(time.monotonic())),
+        SLOW_READER,
+        raw=True,
+    )
+    latched = graph.subscribe(String, GAIT.name, LATCHED)
+    player = play(bag, "--rate", str(RATE))
+    graph.spin_until(lambda: player.poll() is not None, "the player")
+    output = player.communicate()[0]
+    graph.spin_for(0.3)
+    assert player.returncode == 0, output
+    assert f"played {COUNT + 1} messages on 2 topics" in output
+    assert [number_of(data) for data in raw] == list(range(COUNT))
+    assert [message.data for message in latched] == ["a gait"]
+    # The last one was due at the end of the recording's time, however long a message takes.
+    assert times[-1] - times[0] > (COUNT - 1) * PERIOD_NS * 1e-9 / RATE - 0.1
+    assert np.median(np.diff(times)) > 0.5 * PERIOD_NS * 1e-9 / RATE
+
+
+def test_topics_are_picked_and_wrong_ones_refused(graph, bag):
+    player = play(bag, "--topics", "/nothing")
+    assert player.wait(60) == 2
+    assert "the bag has no topic /nothing; it has" in player.communicate()[0]
+    player = play(bag, "--topics", GAIT.name)
+    assert "played 1 messages on 1 topics" in player.communicate(timeout=60)[0]
+
+
+def test_the_recorded_quality_of_service_is_offered_again():
+    for qos in (STREAM, LATCHED):
+        recorded = topic("/t", "std_msgs/msg/String", qos_profile(qos))
+        assert qos_profile(qos_of(recorded)) == qos_profile(qos)
+    discovered = QosProfile(history="unknown", depth=0, reliability="best_effort")
+    assert qos_profile(qos_of(topic("/t", "std_msgs/msg/String", discovered))) == QosProfile(
+        depth=10, reliability="best_effort"
+    )

@@ -1,0 +1,100 @@
+"""Topics of other nodes that go into the bag: found in the graph while a recording runs."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from walk_optimizer.nodes.suite_node import SuiteNode
+from walk_optimizer.recording import Recorder, TopicInfo
+from walk_optimizer.recording.definitions import message_definition, type_hash
+from walk_optimizer.recording.errors import MessageDefinitionError
+from walk_optimizer.recording.ros_messages import message_class, qos_profile
+
+# How often new topics are looked for, in [s].
+_LOOK_PERIOD = 1.0
+# Messages that may wait while the executor does something else.
+_DEPTH = 100
+
+
+class ForeignTopics:
+    """Subscribes to topics as they appear, and records the very bytes that arrive.
+
+    They are recorded with the quality of service that their publishers offer.
+    """
+
+    def __init__(self, node: SuiteNode, names: Sequence[str], recorder: Recorder) -> None:
+        """Look for topics now, and again every second.
+
+        Args:
+            node: That subscribes.
+            names: Of topics, relative to the node's namespace or absolute.
+            recorder: That was started.
+        """
+        self._node, self._recorder = node, recorder
+        self._missing = {str(node.resolve_topic_name(name)) for name in names}
+        self._subscriptions: list[Subscription] = []
+        self._timer = node.repeat(_LOOK_PERIOD, self._look)
+        self._look()
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._node.destroy_timer(self._timer)
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+
+    def _look(self) -> None:
+        for name in sorted(self._missing):
+            publishers = self._node.get_publishers_info_by_topic(name)
+            if publishers:
+                self._missing.discard(name)
+                try:
+                    self._record(name, publishers)
+                except MessageDefinitionError as error:
+                    self._node.get_logger().warning(f"{name} is not recorded: {error}")
+
+    def _record(self, name: str, publishers: Sequence[TopicEndpointInfo]) -> None:
+        """Record a topic.
+
+        Raises:
+            MessageDefinitionError: its type is not installed here.
+        """
+        kind = publishers[0].topic_type
+        info = TopicInfo(
+            name=name,
+            type_name=kind,
+            definition=message_definition(kind),
+            type_hash=type_hash(kind),
+            qos=tuple(qos_profile(publisher.qos_profile) for publisher in publishers),
+        )
+        message_type = message_class(kind)
+        self._recorder.add_topic(info)
+        subscription = self._node.create_subscription(
+            message_type,
+            name,
+            self._taker(name),
+            _offered_by_all(publishers),
+            callback_group=self._node.group,
+            raw=True,
+        )
+        self._subscriptions.append(subscription)
+
+    def _taker(self, name: str) -> Callable[[bytes], None]:
+        def take(data: bytes) -> None:
+            self._recorder.write(name, data, max(self._node.get_clock().now().nanoseconds, 0))
+
+        return take
+
+
+def _offered_by_all(publishers: Sequence[Any]) -> QoSProfile:
+    """Return the strictest quality of service that each of the publishers offers."""
+    profiles = [publisher.qos_profile for publisher in publishers]
+    reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in profiles)
+    latched = all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in profiles)
+    return QoSProfile(
+        depth=_DEPTH,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )

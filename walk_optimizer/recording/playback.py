@@ -1,0 +1,86 @@
+"""When the messages of a bag are due while it is played: as they were recorded, and never in a burst."""
+
+import math
+import time
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
+
+from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.recording.info import BagInfo
+from walk_optimizer.recording.reading import BagMessage, read_messages
+
+NANOSECONDS = 1e9
+_SLOWEST, _FASTEST = 0.01, 100.0
+# A player that is later than this moves its schedule instead of catching up, in [s].
+_LONGEST_DELAY = 0.02
+
+
+class Schedule:
+    """Turns times of recording into times of playing."""
+
+    def __init__(self, rate: float, clock: Callable[[], float] = time.monotonic) -> None:
+        """Begin with the first message.
+
+        Args:
+            rate: Time of the recording for each time of playing.
+            clock: Returns the time in [s].
+
+        Raises:
+            InvalidRequestError: the rate is out of range.
+        """
+        if not _SLOWEST <= rate <= _FASTEST:
+            raise InvalidRequestError(f"rate is {rate:g}, allowed is {_SLOWEST:g} to {_FASTEST:g}")
+        self._rate, self._clock = rate, clock
+        self._begin = math.nan
+        self._first_ns = 0
+        self.delayed = 0.0
+
+    def wait(self, log_time_ns: int) -> float:
+        """Return how long to wait for a message that was recorded at a time in [ns], in [s].
+
+        A message that is overdue by long moves all after it, which then keep their distances.
+        """
+        now = self._clock()
+        if math.isnan(self._begin):
+            self._begin, self._first_ns = now, log_time_ns
+        due = self._begin + (log_time_ns - self._first_ns) / NANOSECONDS / self._rate
+        late = now - due
+        if late > _LONGEST_DELAY:
+            self._begin += late
+            self.delayed += late
+        return max(-late, 0.0)
+
+
+def require_topics(info: BagInfo, topics: Collection[str]) -> None:
+    """Refuse topics that a bag has not.
+
+    Raises:
+        InvalidRequestError: names them, and those that there are.
+    """
+    known = [topic.name for topic in info.topics]
+    unknown = sorted(set(topics) - set(known))
+    if unknown:
+        raise InvalidRequestError(f"the bag has no topic {', '.join(unknown)}; it has {', '.join(known)}")
+
+
+def messages_due(
+    path: Path, topics: Collection[str] | None, rate: float, loop: bool
+) -> Iterator[tuple[BagMessage, float]]:
+    """Iterate over the messages of a bag with the wait in [s] before each is to be published.
+
+    Args:
+        path: The bag.
+        topics: Names of the topics wanted; all when None.
+        rate: Time of the recording for each time of playing.
+        loop: Whether to begin anew at the end, without end.
+
+    Yields:
+        The messages; the wait is counted from when one is asked for.
+    """
+    while True:
+        schedule, played = Schedule(rate), 0
+        for message in read_messages(path, topics):
+            yield message, schedule.wait(message.log_time_ns)
+            played += 1
+        if not loop or not played:
+            return
