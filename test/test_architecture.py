@@ -25,7 +25,15 @@ LAYERS = (
     ("certificate", "replay", "refined_certificate"),
     ("search", "optimizer", "reference_solve", "refinement", "mesh_adaptation", "table_builder"),
     ("gait_files", "gait_csv"),
-    ("interpolation", "library_entries", "library_selection", "library", "verification", "report_table"),
+    (
+        "interpolation",
+        "interpolation_bounds",
+        "library_entries",
+        "library_selection",
+        "library",
+        "verification",
+        "report_table",
+    ),
     ("transition",),
     ("profile", "references", "reference_check", "background"),
     (

@@ -1,92 +1,37 @@
 """Gaits between two speeds, blended from the refined gaits of both, and judged like any other.
 
-With s from 0 to 1 between the steps of two gaits A and B, everything is (1 - s) A + s B at the same
-fraction of the step: step length and time, springs, states, torques, forces, impulses. What is linear
-or convex holds exactly: speed, joint limits, friction cones, forces that don't pull. The rest, above
-all the equations of motion, holds up to the square of the distance of A and B. It is measured by the
+With s from 0 to 1 between the steps of two gaits A and B, the motion is (1 - s) A + s B at the same
+fraction of the step, and so are step length and time, springs and impulses: speed and joint limits hold
+exactly. The standing foot, which is off by the square of the distance of A and B, is put in its place.
+Torques and ground reactions are those that this motion takes. What is left over is measured by the
 certificate of refined gaits, with the tolerances of config/interpolation.yaml in place of a solver's.
 
 Collocation polynomials stay such: on the union of both meshes, by fraction of the step, the blend of
 two cubics is a cubic.
 """
 
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.errors import GaitNotFoundError
 from walk_optimizer.gait import Certificate, Gait, RefinedGait, Trajectory
+from walk_optimizer.interpolation_bounds import InterpolationBounds, interpolation_bounds
 from walk_optimizer.mechanics import along_and_normal, mechanics_at
+from walk_optimizer.model.functions import evaluate, mass_matrices
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.resources import config_file, require_positive, settings_from_yaml
 from walk_optimizer.solve.status import SolveReport, Status
-from walk_optimizer.transcription.tableau import NODES_WITH_START
+from walk_optimizer.transcription.tableau import DIFFERENTIATION, NODES_WITH_START
 
 FloatArray = NDArray[np.float64]
 
 # Breaks of two meshes that are closer than this fraction of the step are one.
 _SAME_BREAK = 1e-9
-
-
-@dataclass(frozen=True)
-class InterpolationBounds:
-    """How far a blended gait may be from a solved one (config/interpolation.yaml).
-
-    Attributes:
-        position: Of feet and joints in [m] and [rad].
-        stance_speed: Of a foot under load in [m/s]; times the walker's mass, of impacts in [N s].
-        joint_speed: Of velocities in [m/s] and [rad/s].
-        replay: Within an interval, in [m] and [rad].
-        force: In units of body weight [-] (times 1 m).
-    """
-
-    position: float
-    stance_speed: float
-    joint_speed: float
-    replay: float
-    force: float
-
-    def __post_init__(self) -> None:
-        """Refuse bounds that are not above 0.
-
-        Raises:
-            ConfigurationError: names the bound.
-        """
-        require_positive(self)
-
-    @classmethod
-    def from_yaml(cls, path: Path | None = None) -> "InterpolationBounds":
-        """Read the bounds, by default the packaged ones.
-
-        Raises:
-            ConfigurationError: an entry is missing, unknown or impossible.
-        """
-        return settings_from_yaml(cls, path or config_file("interpolation.yaml"))
-
-    def by_family(self, walker: WalkerParameters) -> dict[str, float]:
-        """Return the tolerances of the families of a refined certificate that a blend may stretch."""
-        places = ("continuity", "landing", "tread", "stance_height", "penetration", "penetration_between")
-        limits = ("joint_limits", "joint_limits_between")
-        return dict.fromkeys(places + limits, self.position) | {
-            "stance_velocity": self.stance_speed,
-            "impact": self.stance_speed * walker.total_mass,
-            "kinematics": self.joint_speed,
-            "interval_replay": self.replay,
-            "dynamics": self.force * walker.weight,
-        }
-
-
-@cache
-def interpolation_bounds() -> InterpolationBounds:
-    """Return the packaged bounds, read once."""
-    return InterpolationBounds.from_yaml()
 
 
 def interpolated(
@@ -111,7 +56,8 @@ def interpolated(
     if lower.refined is None or upper.refined is None:
         raise GaitNotFoundError(f"not interpolated {between}: a neighbour has no refinement")
     share = (request.step_length - lower.step_length) / (upper.step_length - lower.step_length)
-    refined = _blend(lower.refined, upper.refined, share, request.step_time)
+    blend = _standing(lower.walker, _blend(lower.refined, upper.refined, share, request.step_time))
+    refined = _driven(lower.walker, blend)
     certificate = _judged(lower.walker, request, refined, bounds or interpolation_bounds())
     if not certificate.certified:
         raise GaitNotFoundError(f"not interpolated {between}: {certificate.worst}")
@@ -154,6 +100,53 @@ def _blend(lower: RefinedGait, upper: RefinedGait, share: float, step_time: floa
         spring=KneeSpring(float(stiffness), min(float(equilibrium), float(np.pi))),
         step_length=float(weights @ [lower.step_length, upper.step_length]),
         certificate=Certificate(()),
+    )
+
+
+def _standing(walker: WalkerParameters, blend: RefinedGait) -> RefinedGait:
+    """Return the blend moved as a whole, in place and velocity, so that foot 1 stands while it carries load.
+
+    Moving the hip by r and its velocity by w moves both feet by r and w, and the momenta by M w with
+    the two columns of M that belong to the hip. In a step without double support nothing slips then.
+    """
+    trajectory = blend.trajectory
+    flat = trajectory.states.reshape(-1, 12)
+    q, p = flat[:, :6].T, flat[:, 6:].T
+    place, velocity = (evaluate(name, walker, q, p)[:, :, 0] for name in ("feet", "foot_velocities"))
+    moved = flat.copy()
+    moved[:, :2] -= place
+    moved[:, 6:] -= np.einsum("nij,nj->ni", mass_matrices(walker, q)[:, :, :2], velocity)
+    loaded = np.abs(trajectory.forces[:, :, :2]).max(axis=(1, 2)) > 0
+    states = np.where(loaded[:, None, None], moved.reshape(-1, 4, 12), trajectory.states)
+    return replace(blend, trajectory=replace(trajectory, states=states))
+
+
+def _driven(walker: WalkerParameters, blend: RefinedGait) -> RefinedGait:
+    """Return the blend with the torques and the force on foot 1 that its motion takes.
+
+    Of the six equations of motion the force on foot 1 meets those of the hip, as J_1' has an identity
+    there, the knee torques those of the knees. The hip torque acts on both upper legs, with opposite
+    signs, so it meets the difference of theirs. What is left is half of their sum, the moment about the
+    point foot, which nothing can give.
+    """
+    trajectory = blend.trajectory
+    nodes = trajectory.states[:, 1:].reshape(-1, 12).T
+    mechanics = mechanics_at(walker, blend.spring, nodes[:6], nodes[6:])
+    rates = np.einsum("ij,njs->nis", DIFFERENTIATION, trajectory.states[:, :, 6:])
+    rates /= trajectory.lengths[:, None, None]
+    torques, forces = trajectory.torques.reshape(-1, 3).T.copy(), trajectory.forces.reshape(-1, 4).T.copy()
+    missing = rates.reshape(-1, 6).T - mechanics.momentum_rate(torques, forces)
+    on_foot = np.zeros_like(forces)
+    on_foot[:2] = missing[:2]
+    left = missing - mechanics.generalized(on_foot)
+    torques += np.array([(left[2] - left[4]) / 2, left[3], left[5]])
+    return replace(
+        blend,
+        trajectory=replace(
+            trajectory,
+            torques=torques.T.reshape(-1, 3, 3),
+            forces=(forces + on_foot).T.reshape(-1, 3, 4),
+        ),
     )
 
 

@@ -75,13 +75,13 @@ class Query:
 
 
 def parse_selection(name: Selection | str) -> Selection:
-    """Return the selection of that name; an empty one means exact.
+    """Return the selection of that name.
 
     Raises:
         InvalidRequestError: there is none of that name.
     """
     try:
-        return Selection(name or Selection.EXACT)
+        return Selection(name)
     except ValueError:
         allowed = ", ".join(entry.value for entry in Selection)
         raise InvalidRequestError(f"unknown selection {name!r}; allowed are {allowed}") from None

@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 from walk_optimizer.errors import ConfigurationError, GaitNotFoundError
-from walk_optimizer.interpolation import InterpolationBounds, interpolated, interpolation_bounds
+from walk_optimizer.interpolation import interpolated
+from walk_optimizer.interpolation_bounds import InterpolationBounds, interpolation_bounds
 from walk_optimizer.library import EXACT_SPEED_TOLERANCE, GaitLibrary, Source
+from walk_optimizer.mechanics import mechanics_at
+from walk_optimizer.model.functions import evaluate
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.profile import most_accurate
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.request import GaitRequest, gait_table_settings
+from walk_optimizer.transcription.tableau import DIFFERENTIATION
 
 WALKER = WalkerParameters.from_yaml()
 MODE = "stiffness_and_equilibrium"
@@ -59,8 +63,28 @@ def test_a_blend_is_the_mean_of_its_neighbours_at_the_same_fraction_of_the_step(
         one, other, mixed = (
             profile(gait).sample(fraction * gait.request.step_time) for gait in (*neighbours, blend)
         )
-        np.testing.assert_allclose(mixed.q, (1 - share) * one.q + share * other.q, atol=1e-9)
-        np.testing.assert_allclose(mixed.u, (1 - share) * one.u + share * other.u, atol=1e-7)
+        angles = (1 - share) * one.q + share * other.q
+        np.testing.assert_allclose(mixed.q[2:], angles[2:], atol=1e-9)
+        np.testing.assert_allclose(mixed.q[:2], angles[:2], atol=1e-3)
+
+
+def test_the_torques_of_a_blend_drive_it_but_for_a_moment_about_the_standing_foot(blend):
+    """Only the two upper legs' equations have anything left, and both the same."""
+    trajectory = blend.refined.trajectory
+    nodes = trajectory.states[:, 1:].reshape(-1, 12).T
+    mechanics = mechanics_at(WALKER, blend.spring, nodes[:6], nodes[6:])
+    rates = np.einsum("ij,njs->nis", DIFFERENTIATION, trajectory.states) / trajectory.lengths[:, None, None]
+    acting = mechanics.momentum_rate(trajectory.torques.reshape(-1, 3).T, trajectory.forces.reshape(-1, 4).T)
+    left = rates.reshape(-1, 12).T[6:] - acting
+    np.testing.assert_allclose(left[[0, 1, 3, 5]], 0, atol=1e-9)
+    np.testing.assert_allclose(left[2], left[4], atol=1e-9)
+    assert 0 < np.abs(left[2]).max() < interpolation_bounds().force * WALKER.weight
+
+
+def test_the_standing_foot_of_a_blend_stands(blend):
+    states = blend.refined.trajectory.states.reshape(-1, 12).T
+    assert np.abs(evaluate("feet", WALKER, states[:6], states[6:])[:, :, 0]).max() < 1e-12
+    assert np.abs(evaluate("foot_velocities", WALKER, states[:6], states[6:])[:, :, 0]).max() < 1e-12
 
 
 def test_a_blend_is_as_continuous_as_a_solved_gait(blend):

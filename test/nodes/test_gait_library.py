@@ -14,6 +14,7 @@ from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.conversions import trajectory_from_message
 from walk_optimizer.nodes.qos import LATCHED
+from walk_optimizer.nodes.streamed_gait import StreamedGait
 from walk_optimizer.request import GaitRequest
 
 pytestmark = pytest.mark.ros
@@ -44,6 +45,32 @@ def test_nearest_and_the_table_for_a_late_joiner(graph, start, stocked):
     assert [(row.speed, row.objective) for row in latched[0].gaits] == [
         (row.speed, row.objective) for row in table.gaits
     ]
+
+
+def test_any_speed_is_blended_within_bounds_and_the_answer_says_so(graph, start, tmp_path):
+    """With the packaged table, and without an optimizer."""
+    node = start("gait_library", cache_folder=tmp_path)
+    printed = 1.15 / 3.6
+    answer = graph.call(GetGait, GET, speed=printed, spring_mode=MODE)
+    assert (answer.success, answer.source, answer.gait.method) == (True, "interpolated", "interpolated")
+    assert answer.gait.speed == pytest.approx(printed, abs=1e-6)
+    assert "0.3194 m/s asked for, 0.3194 m/s delivered: interpolated between 0.3185 and" in answer.message
+    streamed = StreamedGait.from_message(answer.gait, WalkerParameters.from_yaml())
+    assert streamed.profile.step_length / streamed.profile.step_time == pytest.approx(printed, abs=1e-6)
+    assert graph.call(GetGait, GET, speed=printed, spring_mode=MODE).gait == answer.gait
+    near = graph.call(GetGait, GET, speed=printed, spring_mode=MODE, selection="nearest")
+    assert (near.source, near.gait.method) == ("table", "implicit_euler")
+    assert "0.3194 m/s asked for, 0.3185 m/s delivered: from the table" in near.message
+    for fields in (
+        {"speed": printed, "spring_mode": MODE, "selection": "exact"},
+        {"speed": 0.45, "spring_mode": "none"},
+    ):
+        refused = graph.call(GetGait, GET, **fields)
+        assert not refused.success
+        assert "optimize_gait is not there" in refused.message
+        assert ("not interpolated between 0.4167" in refused.message) == (fields["speed"] == 0.45)
+    assert not list(tmp_path.glob("*.npz"))
+    assert "Traceback" not in node.output()
 
 
 def test_refusals_say_what_the_core_says_and_the_node_lives_on(graph, start, stocked):

@@ -104,7 +104,8 @@ class GaitLibraryNode(ManagedNode):
 
     async def _get(self, request: GetGait.Request, response: GetGait.Response) -> None:
         wanted = self._wanted(request.speed, request.spring_mode)
-        gait, response.source, how = await self._find(wanted, parse_selection(request.selection))
+        selection = parse_selection(request.selection or Selection.INTERPOLATED)
+        gait, response.source, how = await self._find(wanted, selection)
         response.gait = gait_to_message(gait)
         if response.source == Source.INTERPOLATED:
             response.gait.method = response.source
