@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.certificate import RELATIVE_TOLERANCE, spring_entries, tread_entries
+from walk_optimizer.contact.schedule import LEAST_SLIP_SPEED
 from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
 from walk_optimizer.mechanics import Mechanics, along_and_normal, foot_arm, mechanics_at
 from walk_optimizer.model.kinematics import RELABELLED
@@ -11,7 +12,7 @@ from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.replay import interval_errors
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.transcription.tableau import DIFFERENTIATION
+from walk_optimizer.transcription.tableau import DIFFERENTIATION, STAGES
 
 FloatArray = NDArray[np.float64]
 
@@ -116,17 +117,45 @@ def _landing_error(walker: WalkerParameters, request: GaitRequest, gait: Refined
 def contact_entries(
     walker: WalkerParameters, tread: float, mechanics: Mechanics, forces: FloatArray
 ) -> list[CertificateEntry]:
-    """Return what the feet do at the nodes: those under load stand, none is below the ground."""
+    """Return what the feet do at the nodes: those under load stand or slip, none is below the ground."""
     gaps = np.array([walker.terrain.gap(foot.position, tread) for foot in mechanics.feet])
     loaded = np.array([forces[:2].any(axis=0), forces[2:].any(axis=0)])
-    speeds = np.array([np.abs(mechanics.foot_velocity(leg)).max(axis=0) for leg in range(2)])
+    velocities = (walker.terrain.along_and_normal(mechanics.foot_velocity(leg)) for leg in range(2))
+    along, normal = np.abs(np.array(list(velocities))).transpose(1, 0, 2)
+    slips = loaded & _slipping(along)
+    speeds = np.where(slips, normal, np.maximum(along, normal))
     force_tolerance = RELATIVE_TOLERANCE * walker.weight
     return [
+        *_slip_entries(walker, mechanics, forces, slips),
         CertificateEntry("stance_velocity", largest(np.where(loaded, speeds, 0.0)), "m/s", _TOLERANCE),
         CertificateEntry("stance_height", largest(np.where(loaded, gaps, 0.0)), "m", _TOLERANCE),
         CertificateEntry("penetration", largest(np.minimum(gaps, 0.0)), "m", _TOLERANCE),
         CertificateEntry("friction_cone", _cone_excess(walker, forces), "N", force_tolerance),
     ]
+
+
+def _slipping(speeds: FloatArray) -> NDArray[np.bool_]:
+    """Return at which nodes a foot that carries load slips: those of intervals in which it ever moves.
+
+    Args:
+        speeds: Magnitudes of the tangential velocities of both feet in [m/s], (2, 3 n).
+    """
+    fastest = speeds.reshape(2, -1, STAGES).max(axis=2)
+    return np.repeat(fastest > LEAST_SLIP_SPEED, STAGES, axis=1)
+
+
+def _slip_entries(
+    walker: WalkerParameters, mechanics: Mechanics, forces: FloatArray, slips: NDArray[np.bool_]
+) -> list[CertificateEntry]:
+    """Return how far friction is from all that the cone allows, against the slip; nothing without slip."""
+    if not slips.any():
+        return []
+    components = along_and_normal(walker, forces)
+    velocities = (walker.terrain.along_and_normal(mechanics.foot_velocity(leg)) for leg in range(2))
+    along = np.array([velocity[0] for velocity in velocities])
+    friction = -np.sign(along) * walker.friction_coefficient * components[[1, 3]]
+    defect = np.where(slips, (components[[0, 2]] - friction) * along, 0.0)
+    return [CertificateEntry("slip_friction", largest(defect), "W", RELATIVE_TOLERANCE * walker.weight)]
 
 
 def bound_entries(

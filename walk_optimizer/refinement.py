@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.contact.observation import schedule_of
-from walk_optimizer.contact.schedule import FootMode, single_impact
+from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.gait import Certificate, Gait, RefinedGait
 from walk_optimizer.mechanics import foot_arm, horizontal_and_vertical
 from walk_optimizer.mesh_adaptation import MeshErrors, resampled, trajectory_on
@@ -16,7 +16,7 @@ from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
-from walk_optimizer.transcription.phases import INSTANT_POINTS, Phase, phases_of
+from walk_optimizer.transcription.phases import INSTANT_POINTS, Phase, phases_of, without_instants
 from walk_optimizer.transcription.refined import RefinedProblem
 from walk_optimizer.transcription.scaling import torque_unit
 
@@ -24,7 +24,7 @@ FloatArray = NDArray[np.float64]
 
 _INITIAL_INTERVALS = 24
 _FEWEST_INTERVALS = 3
-_MOST_PHASES = 3
+_MOST_PHASES = 5
 _ROUNDS = 4
 # Barrier parameter for a start from the report's grid or from a coarser mesh.
 _BARRIER = 1e-5
@@ -104,19 +104,18 @@ class _Refinement:
         return best
 
     def _initial_meshes(self) -> list[Mesh]:
-        """Return even meshes of the gait's own phases and of plain single support.
+        """Return even meshes of the gait's own phases, of those without instants, and of single support.
 
         Contacts of the report's grid that last an instant, and the brushing of a swing foot, are often
-        made by its coarseness: plain single support may be as good or better.
+        made by its coarseness: what is left without them may be as good or better.
         """
         trajectory = self.gait.trajectory
         schedule = schedule_of(
             self.walker, self.request.step_length, trajectory.q, trajectory.p, trajectory.reaction
         )
-        own, plain = phases_of(schedule), phases_of(single_impact(trajectory.points))
-        slips = any(mode > FootMode.STICK for phase in own for mode in (*phase.modes, *phase.impact))
-        plans = [plain] if own == plain or slips or len(own) > _MOST_PHASES else [own, plain]
-        return [_even_mesh(phases) for phases in plans]
+        schedules = (schedule, without_instants(schedule), single_impact(trajectory.points))
+        plans = dict.fromkeys(phases_of(one) for one in schedules)
+        return [_even_mesh(phases) for phases in plans if _is_followed(phases)]
 
     def _initial_points(self, mesh: Mesh) -> RefinedPoints:
         """Interpolate the grid's states, torques and forces onto the mesh.
@@ -152,6 +151,14 @@ class _Refinement:
             return RefinedSolution(solution.status, mesh, None, points.spring)
         found = refined.unpack(solution.x)
         return RefinedSolution(Status.SOLVED, mesh, trajectory_on(mesh, found), found.spring)
+
+
+def _is_followed(phases: tuple[Phase, ...]) -> bool:
+    """Return whether phases are worth a solve: few enough, and no foot slips in an impact.
+
+    An impulse that slips is the coarse grid's picture of a slip that ends with the step.
+    """
+    return len(phases) <= _MOST_PHASES and not any(mode.slips for one in phases for mode in one.impact)
 
 
 def _even_mesh(phases: tuple[Phase, ...]) -> Mesh:

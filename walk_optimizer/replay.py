@@ -1,7 +1,7 @@
 """Replays torques through a tight integrator, apart from the collocation that made them.
 
 The motion between impacts is integrated as an ordinary differential equation of high accuracy, with
-the ground reactions that hold the standing feet solved for at every instant.
+the ground reactions that hold the feet under load solved for at every instant.
 """
 
 from functools import cache
@@ -11,52 +11,66 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from walk_optimizer.model import dynamics
-from walk_optimizer.model.kinematics import foot_position
+from walk_optimizer.contact.schedule import LEAST_SLIP_SPEED, FootMode
+from walk_optimizer.mechanics import mechanics_at
+from walk_optimizer.model import dynamics, ground
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.transcription.phases import Modes
 
 FloatArray = NDArray[np.float64]
 
 _TOLERANCES = {"rtol": 1e-10, "atol": 1e-10}
-# Feet that stand are held where they are: the ground plays no part.
+# Feet that stand or slip are held on the surface that they are on: of the ground its slope counts.
 _ANY_TREAD = 1.0
-Standing = tuple[bool, bool]
 
 
 @cache
-def _rate_function(standing: Standing) -> ca.Function:
-    """Return (state, u, spring, walker) -> rate of the state (12,) with the feet that stand held.
+def _rate_function(modes: Modes) -> ca.Function:
+    """Return (state, u, spring, walker) -> rate of the state (12,) with the feet that carry load held.
 
-    With qdot = M^-1 p, holding a foot means d/dt (J qdot) = 0, and pdot = f + J' lambda, so
-    J M^-1 J' lambda = -J M^-1 (f - Mdot qdot) - Jdot qdot.
+    With qdot = M^-1 p, holding a foot means d/dt (J qdot) = 0 of the velocities that are held, both of
+    a foot that sticks and the normal one of a foot that slips. With pdot = f + D lambda,
+    J M^-1 D lambda = -J M^-1 (f - Mdot qdot) - Jdot qdot. D is J', but for a foot that slips its
+    column also holds the friction against the slip, mu times the normal force.
     """
     walker = SymbolicWalker()
     q, p, u, spring = (ca.SX.sym(*one) for one in (("q", 6), ("p", 6), ("u", 3), ("spring", 2)))
     v = ca.SX.sym("v", 6)
-    feet = [foot_position(walker, q, leg) for leg in range(2) if standing[leg]]
+    held = [_held(walker, q, leg, mode) for leg, mode in enumerate(modes) if mode is not FootMode.FREE]
     matrix = dynamics.mass_matrix(walker, q)
     force = dynamics.generalized_force(walker, q, v, spring) + ca.mtimes(ca.DM(dynamics.INPUT_MAP), u)
     rate = force
-    if feet:
-        jacobian = ca.jacobian(ca.vertcat(*feet), q)
+    if held:
+        jacobian = ca.vertcat(*(rows for rows, _ in held))
+        directions = ca.horzcat(*(columns for _, columns in held))
         inertial = ca.solve(matrix, force - ca.mtimes(ca.jtimes(matrix, q, v), v))
         drift = ca.mtimes(ca.jtimes(jacobian, q, v), v)
-        effective = ca.mtimes(jacobian, ca.solve(matrix, jacobian.T))
+        effective = ca.mtimes(jacobian, ca.solve(matrix, directions))
         reaction = ca.solve(effective, -ca.mtimes(jacobian, inertial) - drift)
-        rate = force + ca.mtimes(jacobian.T, reaction)
+        rate = force + ca.mtimes(directions, reaction)
     inner = ca.Function("inner", [q, v, u, spring, walker.symbols], [rate])
     velocity = dynamics.velocity(walker, q, p)
     complete = ca.vertcat(velocity, inner(q, velocity, u, spring, walker.symbols))
     return ca.Function("rate", [ca.vertcat(q, p), u, spring, walker.symbols], [complete])
 
 
+def _held(walker: SymbolicWalker, q: ca.SX, leg: int, mode: FootMode) -> tuple[ca.SX, ca.SX]:
+    """Return the rows J of a foot's velocities that are held, and the columns D of what holds it."""
+    rows = dynamics.foot_jacobian(walker, q, leg)
+    if mode is FootMode.STICK:
+        return rows, rows.T
+    along, normal = ground.along_and_normal(walker, ca.vertsplit(rows))
+    against = -1.0 if mode is FootMode.SLIP_FORWARD else 1.0
+    return normal, (normal + against * walker.friction_coefficient * along).T
+
+
 def replay_interval(
     walker: WalkerParameters, spring: KneeSpring, trajectory: RefinedTrajectory, index: int, state: FloatArray
 ) -> FloatArray:
     """Return the state (12,) at the end of an interval when its torques act on a state at its start."""
-    rate = _rate_function(_standing(trajectory, index))
+    rate = _rate_function(contact_modes(walker, spring, trajectory, index))
     parameters = ((spring.stiffness, spring.equilibrium), walker.vector(_ANY_TREAD))
     length = float(trajectory.lengths[index])
 
@@ -68,10 +82,30 @@ def replay_interval(
     return end
 
 
-def _standing(trajectory: RefinedTrajectory, index: int) -> Standing:
-    """Return which feet carry load in an interval."""
-    loads = np.abs(trajectory.forces[index]).max(axis=0)
-    return bool(loads[:2].any()), bool(loads[2:].any())
+def contact_modes(
+    walker: WalkerParameters, spring: KneeSpring, trajectory: RefinedTrajectory, index: int
+) -> Modes:
+    """Return what each foot does in an interval, as its forces and velocities at the nodes show."""
+    nodes = trajectory.states[index, 1:].T
+    mechanics = mechanics_at(walker, spring, nodes[:6], nodes[6:])
+    first, second = (
+        _mode(
+            trajectory.forces[index][:, 2 * leg : 2 * leg + 2],
+            walker.terrain.along_and_normal(mechanics.foot_velocity(leg))[0],
+        )
+        for leg in range(2)
+    )
+    return first, second
+
+
+def _mode(forces: FloatArray, slip: FloatArray) -> FootMode:
+    """Return what a foot does with the forces (3, 2) in [N] and tangential velocities (3,) in [m/s]."""
+    if not forces.any():
+        return FootMode.FREE
+    fastest = slip[np.argmax(np.abs(slip))]
+    if abs(fastest) <= LEAST_SLIP_SPEED:
+        return FootMode.STICK
+    return FootMode.SLIP_FORWARD if fastest > 0 else FootMode.SLIP_BACKWARD
 
 
 def interval_errors(

@@ -14,6 +14,11 @@ class FootMode(IntEnum):
     SLIP_FORWARD = 2
     SLIP_BACKWARD = 3
 
+    @property
+    def slips(self) -> bool:
+        """Whether the foot slides under load."""
+        return self in (FootMode.SLIP_FORWARD, FootMode.SLIP_BACKWARD)
+
 
 Schedule = NDArray[np.int8]
 FloatArray = NDArray[np.float64]

@@ -1,6 +1,7 @@
 """Bounds of the rows and forces of a phase: what a foot does there, as equations and inequalities."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +35,32 @@ def stage_bounds(layout: PhaseLayout, landing: Landing) -> list[RowBounds]:
         landing: Which feet land at the end of the last one.
     """
     bounds: list[RowBounds] = []
-    landings = [*((phase.landing, phase.begins_with_impact) for phase, _ in layout[1:]), (landing, True)]
-    for (phase, intervals), after in zip(layout, landings, strict=True):
+    phases = [phase for phase, _ in layout]
+    landings = [*((phase.landing, phase.begins_with_impact) for phase in phases[1:]), (landing, True)]
+    stops = [*(_stopping(*pair) for pair in pairwise(phases)), (False, False)]
+    for (phase, intervals), after, stopping in zip(layout, landings, stops, strict=True):
         bounds += [impact_bounds(phase)] * phase.begins_with_impact
         bounds += [interval_bounds(phase.modes)] * (intervals - 1)
-        bounds.append(_ended(interval_bounds(phase.modes), *after))
+        bounds.append(_ended(_stopped(interval_bounds(phase.modes), stopping), *after))
     return bounds
+
+
+def _stopping(phase: Phase, after: Phase) -> tuple[bool, bool]:
+    """Return which feet slip in a phase and stick in the one after it without an impact that stops them."""
+    first, second = (
+        before.slips and then is FootMode.STICK and hit is FootMode.FREE
+        for before, then, hit in zip(phase.modes, after.modes, after.impact, strict=True)
+    )
+    return first, second
+
+
+def _stopped(bounds: RowBounds, stopping: tuple[bool, bool]) -> RowBounds:
+    """Return the bounds of an interval at the end of which slipping feet come to rest."""
+    low, high = bounds
+    for foot in np.flatnonzero(stopping):
+        row = low.size - radau.CONTACT_ROWS + _TANGENTIAL + foot
+        low[row] = high[row] = 0.0
+    return low, high
 
 
 def interval_bounds(modes: Modes) -> RowBounds:

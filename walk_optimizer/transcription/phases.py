@@ -64,6 +64,17 @@ def phases_of(schedule: Schedule) -> tuple[Phase, ...]:
     return tuple(phases)
 
 
+def without_instants(schedule: Schedule) -> Schedule:
+    """Return the schedule in which what a foot does for an instant, but at the start, counts as before it."""
+    steady = schedule.copy()
+    for modes in steady:
+        changes = np.flatnonzero(np.diff(modes)) + 1
+        for start, end in pairwise([*changes.tolist(), modes.size]):
+            if end - start <= INSTANT_POINTS:
+                modes[start:end] = modes[start - 1]
+    return steady
+
+
 def _runs(schedule: Schedule) -> list[tuple[int, Modes]]:
     """Return length and modes of each run of equal columns."""
     changes = np.flatnonzero(np.any(np.diff(schedule, axis=1) != 0, axis=0)) + 1
