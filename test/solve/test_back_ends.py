@@ -118,9 +118,9 @@ def test_a_solver_that_dies_or_raises_is_a_solver_error():
     died = isolated(lambda: os._exit(1), rosenbrock(), START, None)
     assert died.status is Status.SOLVER_ERROR
     assert died.detail == "the solver's process ended"
-    raised = isolated(lambda: [][0], rosenbrock(), START, None)
+    raised = isolated(lambda: {}["x"], rosenbrock(), START, None)
     assert raised.status is Status.SOLVER_ERROR
-    assert raised.detail == "IndexError: list index out of range"
+    assert raised.detail == "KeyError: 'x'"
 
 
 def test_what_a_child_process_finds_comes_back():
@@ -138,7 +138,7 @@ def test_fatrop_refuses_a_program_without_stages():
 
 
 def test_a_missing_library_is_found_before_any_work(monkeypatch):
-    monkeypatch.setattr(registry, "find_spec", lambda package: None)
+    monkeypatch.setattr(registry, "find_spec", lambda _: None)
     settings = replace(solver_settings(), back_end="snopt")
     with pytest.raises(MissingDependencyError) as refusal:
         SolveSession(settings, 1.0, None)
@@ -147,6 +147,6 @@ def test_a_missing_library_is_found_before_any_work(monkeypatch):
 
 
 def test_a_build_of_casadi_without_the_solver_is_named(monkeypatch):
-    monkeypatch.setattr("casadi.has_nlpsol", lambda plugin: False)
+    monkeypatch.setattr("casadi.has_nlpsol", lambda _: False)
     with pytest.raises(MissingDependencyError, match="back end uno is not in this build of CasADi: install"):
         back_end("uno")
