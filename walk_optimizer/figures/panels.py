@@ -33,15 +33,23 @@ def draw_poses(axes: "Axes", gait: Gait) -> None:
         axes.plot(*stance, color=STANCE_COLOUR, linewidth=3.0, solid_capstyle="round", zorder=4)
         axes.plot(*stance[:, 1], "o", color="white", markersize=2, zorder=5)
         axes.plot(*stance[:, 0], "o", color="black", markersize=7, zorder=6)
-    axes.axhline(0.0, color="black", linewidth=1.2, zorder=1)
+        _draw_ground(axes, gait, spacing, shift[0, 0])
     axes.set_xticks(
         spacing * np.arange(len(chosen)), [f"{gait.trajectory.time[index]:.2f}" for index in chosen]
     )
     axes.set_aspect("equal")
     axes.grid(visible=False)
-    axes.set_ylim(-0.06 * length, 1.1 * length)
+    lowest = gait.walker.terrain.height(np.array([-spacing, spacing]) / 2, gait.request.step_length).min()
+    axes.set_ylim(lowest - 0.06 * length, 1.1 * length)
     axes.set(title="One step", xlabel="time [s]", ylabel="height [m]")
     _name_legs(axes)
+
+
+def _draw_ground(axes: "Axes", gait: Gait, width: float, shift: float) -> None:
+    """Draw the piece of ground about the stance foot of a pose, both in [m], at its place in the picture."""
+    places = np.linspace(-width / 2, width / 2, 60)
+    height = gait.walker.terrain.height(places, gait.request.step_length)
+    axes.plot(places + shift, height, color="black", linewidth=1.2, zorder=1)
 
 
 def _name_legs(axes: "Axes") -> None:
@@ -58,13 +66,16 @@ def _name_legs(axes: "Axes") -> None:
 def draw_foot_path(axes: "Axes", gait: Gait) -> None:
     """Draw the path of the swing foot relative to the stance foot, its height enlarged."""
     stance, swing = (leg_points(gait.walker, gait.trajectory.q, leg)[2] for leg in range(2))
-    axes.plot(swing[0] - stance[0], 1000 * swing[1], color=SWING_COLOUR)
+    gap = gait.walker.terrain.gap(swing, gait.request.step_length)
+    axes.plot(swing[0] - stance[0], 1000 * gap, color=SWING_COLOUR)
     axes.axhline(0.0, color="black", linewidth=1.2)
     axes.plot(0.0, 0.0, "^", color=STANCE_COLOUR, markersize=8, clip_on=False, label="stance foot")
     axes.legend(loc="upper center")
     bottom, top = axes.get_ylim()
     axes.set_ylim(bottom, top + 0.25 * (top - bottom))
-    axes.set(title="Path of the swing foot", xlabel="ahead of the stance foot [m]", ylabel="height [mm]")
+    axes.set(
+        title="Path of the swing foot", xlabel="ahead of the stance foot [m]", ylabel="above ground [mm]"
+    )
 
 
 def full_cycle(gait: Gait, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
