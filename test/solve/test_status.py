@@ -46,7 +46,7 @@ def test_a_step_beyond_the_legs_is_infeasible():
     walker, request = WalkerParameters(), GaitRequest.for_speed(0.42, "none", 20)
     problem = fixed_schedule_problem(request, walker, single_impact(20))
     lower_g = problem.lower_g.copy()
-    lower_g[-1] = 5.0
+    lower_g[-1] = 2.5
     start = to_scaled(walker, kinematic_guess(walker, request, GuessShape()), KneeSpring())
     solution = solve(replace(problem, lower_g=lower_g), start, SolveOptions())
     assert solution.status is Status.INFEASIBLE
