@@ -46,7 +46,7 @@ from walk_optimizer.transcription.program import Problem
 # Processor time of a solve in [s], which is the same on a busy machine.
 TIME_LIMIT = 10.0
 # Wall time after which a process is killed whatever it does, in [s].
-LOST = 90.0
+LOST = 300.0
 NEAR = 1e-9
 # Optima whose F agree to this relative difference are taken for one.
 SAME = 1e-3

@@ -18,6 +18,7 @@ from walk_optimizer.cli.arguments import (
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.solve.registry import BACK_ENDS, back_end
 
 if TYPE_CHECKING:
     from walk_optimizer.solve.settings import SolverSettings
@@ -48,7 +49,8 @@ def add_parser(verbs: Subparsers) -> None:
     add_walker(parser)
     add_library(parser)
     parser.add_argument("--time-limit", metavar="SECONDS", help="give up after this time")
-    parser.add_argument("--solver", metavar="NAME", help="another back end (default: config/solver.yaml)")
+    known = ", ".join(f"{name} ({entry.method})" for name, entry in BACK_ENDS.items())
+    parser.add_argument("--solver", metavar="NAME", help=f"{known}; default: that of config/solver.yaml")
     parser.add_argument(
         "--formulation",
         choices=_FORMULATIONS,
@@ -73,7 +75,6 @@ def solver_settings_from(args: argparse.Namespace) -> "SolverSettings":
             "--formulation report is IPOPT's and shows residuals: leave --solver, --save and --export out"
         )
 
-    from walk_optimizer.solve.registry import back_end
     from walk_optimizer.solve.settings import solver_settings
 
     settings = solver_settings()

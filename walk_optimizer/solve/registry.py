@@ -3,9 +3,12 @@
 import importlib
 from dataclasses import dataclass
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 from walk_optimizer.errors import MissingDependencyError
-from walk_optimizer.solve.back_end import BackEnd
+
+if TYPE_CHECKING:
+    from walk_optimizer.solve.back_end import BackEnd
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ BACK_ENDS = {
 }
 
 
-def back_end(name: str) -> BackEnd:
+def back_end(name: str) -> "BackEnd":
     """Return a back end, ready for work.
 
     Args:
