@@ -4,9 +4,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walk_optimizer.contact.schedule import FootMode
-from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.gait import Gait
+from walk_optimizer.replay import contact_modes
 from walk_optimizer.transcription.phases import Landing, Modes, Phase
 from walk_optimizer.transition.paces import Pace, refined_of
 from walk_optimizer.transition.standing import Standing
@@ -56,13 +58,13 @@ def _walking_phases(source: Pace, target: Pace) -> tuple[Phase, ...]:
     gait = source if isinstance(target, Standing) else target
     if isinstance(gait, Standing):
         raise TypeError("a transition needs a gait at one of its ends")
-    return observed_phases(refined_of(gait).trajectory)
+    return observed_phases(gait)
 
 
 def _begun(source: Pace, walked: tuple[Phase, ...]) -> tuple[Phase, ...]:
     """Return the phases of the first step: where the feet are follows from the state that it begins in."""
     if not isinstance(source, Standing):
-        own = observed_phases(refined_of(source).trajectory)[0]
+        own = observed_phases(source)[0]
         return replace(walked[0], impact=own.impact, landing=_NO_FOOT), *walked[1:]
     lifted = replace(walked[0], impact=(_FREE, _FREE), landing=_NO_FOOT)
     rest = [
@@ -85,26 +87,33 @@ def _exchanged(phase: Phase) -> Phase:
     return Phase((b, a), (d, c), (f, e), phase.start)
 
 
-def observed_phases(trajectory: RefinedTrajectory) -> tuple[Phase, ...]:
-    """Return the phases of a periodic step, read off its forces and impulses."""
-    loads, impacts = (
-        np.abs(values).reshape(trajectory.intervals, -1, 2, 2).max(axis=(1, 3)) > 0
-        for values in (trajectory.forces, trajectory.impulses)
-    )
-    changes = np.any(loads[1:] != loads[:-1], axis=1) | np.any(impacts[1:], axis=1)
-    starts = [0, *(np.flatnonzero(changes) + 1).tolist()]
-    before = [loads[-1][::-1], *(loads[first] for first, _ in pairwise(starts))]
+def observed_phases(gait: Gait) -> tuple[Phase, ...]:
+    """Return the phases of a gait's step, read off the forces, impulses and velocities of its feet."""
+    refined = refined_of(gait)
+    trajectory = refined.trajectory
+    modes = [contact_modes(gait.walker, refined.spring, trajectory, i) for i in range(trajectory.intervals)]
+    impacts = [_impact(impulse) for impulse in trajectory.impulses]
+    later = range(1, trajectory.intervals)
+    starts = [0, *(i for i in later if modes[i] != modes[i - 1] or impacts[i] != (_FREE, _FREE))]
+    before = [modes[-1][::-1], *(modes[first] for first, _ in pairwise(starts))]
     return tuple(
         Phase(
-            modes=_modes(loads[start]),
-            impact=_modes(impacts[start]),
-            landing=(bool(impacts[start][0] and not stood[0]), bool(impacts[start][1] and not stood[1])),
+            modes=modes[start],
+            impact=impacts[start],
+            landing=_landing(impacts[start], stood),
             start=float(trajectory.breaks[start] / trajectory.step_time),
         )
         for start, stood in zip(starts, before, strict=True)
     )
 
 
-def _modes(touching: np.ndarray) -> Modes:
-    first, second = (_STICK if foot else _FREE for foot in touching)
+def _impact(impulse: NDArray[np.float64]) -> Modes:
+    """Return which feet take an impulse (4,) in [N s]."""
+    first, second = (_STICK if foot.any() else _FREE for foot in impulse.reshape(2, 2))
+    return first, second
+
+
+def _landing(impact: Modes, stood: Modes) -> Landing:
+    """Return which feet take part in an impact without having stood before it."""
+    first, second = (hit is not _FREE and mode is _FREE for hit, mode in zip(impact, stood, strict=True))
     return first, second

@@ -137,22 +137,23 @@ class _Solve:
         self.end = end_in(request.target, self.plan)
 
     def run(self) -> TransitionOutcome:
-        """Return the transition on a mesh fine enough for its error."""
+        """Return the transition on a mesh fine enough for its error and its certificate."""
         mesh = even_mesh(self.plan)
         points = faded_points(self.plan, mesh, self.request.source, self.request.target, self.spring)
-        barrier = _FIRST_BARRIER
-        for _ in range(_ROUNDS):
+        barrier, rounds = _FIRST_BARRIER, 0
+        while True:
             status, points = self._solved(mesh, points, barrier)
-            trajectory = trajectory_on(mesh, points)
-            if status is not Status.SOLVED:
-                break
+            trajectory, rounds = trajectory_on(mesh, points), rounds + 1
+            if status is not Status.SOLVED or rounds == _ROUNDS:
+                return self._outcome(status, mesh, trajectory)
             errors = MeshErrors.of(self.walker, _ANY_TREAD, self.spring, trajectory)
             if errors.met:
-                break
-            finer = errors.divided(mesh)
+                outcome = self._outcome(status, mesh, trajectory)
+                if outcome.transition is not None:
+                    return outcome
+            finer = errors.halved(mesh) if errors.met else errors.divided(mesh)
             points = resampled(trajectory, self.spring, mesh, finer)
             mesh, barrier = finer, _NEXT_BARRIER
-        return self._outcome(status, mesh, trajectory)
 
     def _solved(self, mesh: Mesh, points: RefinedPoints, barrier: float) -> tuple[Status, RefinedPoints]:
         """Solve on a mesh from a start; return how it ended and where."""
