@@ -6,11 +6,13 @@ import pytest
 
 pytest.importorskip("rclpy")
 pytest.importorskip("lxml")
+pytest.importorskip("tf2_msgs")
 
 from lxml import etree
 from nodes.graph import PATIENCE
 from rclpy.action import get_action_server_names_and_types_by_node
 from security.policies import POLICY, RULES, load_policy, problems, profiles
+from tf2_msgs.msg import TFMessage
 
 from walk_optimizer.cli.processes import NodeProcess
 
@@ -64,9 +66,11 @@ def test_sros2_makes_signed_permissions_of_the_policy(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def nodes(start_for_module):
+def nodes(start_for_module, tmp_path_factory):
+    """The nodes at work: all of them in a simulation, and one recording topics of the others."""
+    recording = {"record": True, "recording_folder": tmp_path_factory.mktemp("bags")}
     for name in NODES:
-        start_for_module(name, use_sim_time=True)
+        start_for_module(name, use_sim_time=True, **(recording if name == "reference_publisher" else {}))
 
 
 def split_actions(names):
@@ -97,6 +101,8 @@ def done_by(node, name):
 @pytest.mark.parametrize("name", NODES)
 def test_a_node_may_do_exactly_what_it_does(graph, nodes, name):
     allowed = profiles()[f"/walk_optimizer/{name}"].allowed
+    # Of robot_state_publisher: a recorder takes it where there is one.
+    graph.node.create_publisher(TFMessage, "/tf_static", 1)
 
     def differences():
         if (name, "/") not in graph.node.get_node_names_and_namespaces():
