@@ -52,7 +52,7 @@ class ForeignTopics:
                 self._missing.discard(name)
                 try:
                     self._record(name, publishers)
-                except MessageDefinitionError as error:
+                except (MessageDefinitionError, RuntimeError) as error:  # also what SROS2 denies
                     self._node.get_logger().warning(f"{name} is not recorded: {error}")
 
     def _record(self, name: str, publishers: Sequence[TopicEndpointInfo]) -> None:
