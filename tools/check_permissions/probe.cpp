@@ -10,17 +10,20 @@
 #include <cstring>
 #include <functional>
 #include <iostream>
+#include <memory>
 #include <string>
 #include <thread>
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/log/Log.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 
 using namespace eprosima::fastdds::dds;
 using namespace eprosima::fastrtps::rtps;
@@ -49,10 +52,20 @@ struct NumberType : TopicDataType
   bool getKey(void *, InstanceHandle_t *, bool) override { return false; }
 };
 
+// A participant without shared memory, in which another version of Fast DDS would be met.
+DomainParticipantQos stranger()
+{
+  DomainParticipantQos qos;
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports.push_back(
+    std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
+  return qos;
+}
+
 // The properties that rmw_fastrtps sets for an enclave.
 DomainParticipantQos qos_of(const std::string & folder)
 {
-  DomainParticipantQos qos;
+  DomainParticipantQos qos = stranger();
   const std::string files = "file://" + folder + "/";
   const std::string authentication = "dds.sec.auth.builtin.PKI-DH.";
   const std::string access = "dds.sec.access.builtin.Access-Permissions.";
@@ -79,8 +92,10 @@ int main(int count, char ** arguments)
   }
   const std::string folder = arguments[1];
   const int seconds = count > 2 ? std::stoi(arguments[2]) : 0;
+  // What is refused is logged too, in the middle of our lines.
+  Log::ClearConsumers();
   auto * participant = DomainParticipantFactory::get_instance()->create_participant(
-    0, folder == "-" ? DomainParticipantQos() : qos_of(folder));
+    0, folder == "-" ? stranger() : qos_of(folder));
   if (participant == nullptr) {
     std::cerr << "no participant: the enclave's keys or permissions were refused\n";
     return 1;
