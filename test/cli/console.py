@@ -23,7 +23,7 @@ def environment(home: Path | None) -> dict[str, str]:
     own = home / "walk_optimizer"
     own.mkdir(exist_ok=True)
     for entry in _CACHE.iterdir() if _CACHE.is_dir() else ():
-        if entry.name != "gaits" and not (own / entry.name).exists():
+        if entry.name not in {"gaits", "transitions"} and not (own / entry.name).exists():
             (own / entry.name).symlink_to(entry)
     return {**os.environ, "XDG_CACHE_HOME": str(home)}
 

@@ -78,6 +78,13 @@ def test_packaged_transitions_join_what_they_lead_from_and_to(walker, stand, gai
     assert certificate.certified
 
 
+def test_every_pair_of_the_table_is_solved(table, stand, gaits):
+    every = [gait for own in gaits.values() for gait in own]
+    pairs = {(pace_name(one), pace_name(other)) for one, other in table_pairs(stand, every)}
+    assert len(pairs) == len(SpringMode) * (2 * 7 + 2 * 6)
+    assert {(name.source, name.target) for name in table.names()} == pairs
+
+
 def test_every_speed_on_springs_is_reached_from_the_stand_and_left_to_it(table, stand, gaits):
     for gait in gaits[SPRUNG]:
         start, stop = table.find(stand, gait), table.find(gait, stand)
