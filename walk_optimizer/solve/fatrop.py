@@ -4,7 +4,6 @@ The cost of an iteration grows linearly with the number of stages. It carries th
 shared variables along all of them, see `staging`.
 """
 
-import weakref
 from typing import Any
 
 import casadi as ca
@@ -12,6 +11,7 @@ import numpy as np
 
 from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.solve.back_end import SolveOptions, ended, refused_start
+from walk_optimizer.solve.instances import Instances
 from walk_optimizer.solve.isolation import isolated
 from walk_optimizer.solve.oracle import FloatArray, IntArray, Oracle, extended_parameters, free_variables
 from walk_optimizer.solve.solution import Monitor, Solution
@@ -60,8 +60,7 @@ class _Instance:
         self.solver = ca.nlpsol("program", "fatrop", staged.expressions, settings | self.staging.structure)
 
 
-_instances: weakref.WeakKeyDictionary[Nlp, dict[tuple[SolveOptions, bytes], _Instance]]
-_instances = weakref.WeakKeyDictionary()
+_instances: Instances[_Instance] = Instances()
 
 
 def solve(
@@ -75,11 +74,8 @@ def solve(
     if (refusal := refused_start(start)) is not None:
         return refusal
     free = free_variables(problem)
-    of_program = _instances.setdefault(problem.nlp, {})
     key = (options, free.tobytes())
-    if key not in of_program:
-        of_program[key] = _Instance(problem.nlp, free, options)
-    instance = of_program[key]
+    instance = _instances.of(problem.nlp, key, lambda: _Instance(problem.nlp, free, options))
     return isolated(lambda: _solve(instance, problem, start, free, options), problem, start, monitor)
 
 

@@ -1,6 +1,5 @@
 """IPOPT by way of CasADi, with exact derivatives from outside."""
 
-import weakref
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +7,7 @@ import casadi as ca
 import numpy as np
 
 from walk_optimizer.solve.back_end import SolveOptions, refused_start
+from walk_optimizer.solve.instances import Instances
 from walk_optimizer.solve.solution import FloatArray, Monitor, Solution
 from walk_optimizer.solve.status import Status
 from walk_optimizer.solve.watcher import Watcher
@@ -56,7 +56,7 @@ def _settings(options: SolveOptions) -> dict[str, Any]:
 
 
 class _Instance:
-    """One IPOPT solver object for a program and options; building it costs more than a few iterations."""
+    """One IPOPT solver object for a program and options."""
 
     def __init__(self, nlp: Nlp, options: SolveOptions) -> None:
         self.watcher = Watcher(nlp.expressions)
@@ -75,14 +75,7 @@ class _Instance:
         self.solver = ca.nlpsol("program", "ipopt", nlp.expressions, settings)
 
 
-_instances: weakref.WeakKeyDictionary[Nlp, dict[SolveOptions, _Instance]] = weakref.WeakKeyDictionary()
-
-
-def _instance(nlp: Nlp, options: SolveOptions) -> _Instance:
-    of_program = _instances.setdefault(nlp, {})
-    if options not in of_program:
-        of_program[options] = _Instance(nlp, options)
-    return of_program[options]
+_instances: Instances[_Instance] = Instances()
 
 
 def solve(
@@ -98,7 +91,7 @@ def solve(
     """
     if (refusal := refused_start(start)) is not None:
         return refusal
-    instance = _instance(problem.nlp, options)
+    instance = _instances.of(problem.nlp, options, lambda: _Instance(problem.nlp, options))
     instance.watcher.begin(problem, monitor)
     try:
         result = instance.solver(

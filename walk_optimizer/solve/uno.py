@@ -4,7 +4,6 @@ Its quadratic programs are solved by an active-set method, so that its solutions
 bounds, at a cost that grows faster than the number of grid points.
 """
 
-import weakref
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from walk_optimizer.solve.back_end import SolveOptions, ended, refused_start
+from walk_optimizer.solve.instances import Instances
 from walk_optimizer.solve.oracle import IntArray, Oracle, extended_parameters, free_variables
 from walk_optimizer.solve.solution import FloatArray, Monitor, Solution
 from walk_optimizer.solve.status import Status
@@ -103,16 +103,7 @@ class _Instance:
         self.solver = ca.nlpsol("program", "uno", oracle.expressions, settings)
 
 
-_instances: weakref.WeakKeyDictionary[Nlp, dict[tuple[SolveOptions, bytes], _Instance]]
-_instances = weakref.WeakKeyDictionary()
-
-
-def _instance(problem: Problem, free: IntArray, options: SolveOptions) -> _Instance:
-    of_program = _instances.setdefault(problem.nlp, {})
-    key = (options, free.tobytes())
-    if key not in of_program:
-        of_program[key] = _Instance(problem.nlp, free, options)
-    return of_program[key]
+_instances: Instances[_Instance] = Instances()
 
 
 def solve(
@@ -122,7 +113,8 @@ def solve(
     if (refusal := refused_start(start)) is not None:
         return refusal
     free, parameters = free_variables(problem), extended_parameters(problem)
-    instance = _instance(problem, free, options)
+    key = (options, free.tobytes())
+    instance = _instances.of(problem.nlp, key, lambda: _Instance(problem.nlp, free, options))
     reduced = replace(
         problem, parameters=parameters, lower_x=problem.lower_x[free], upper_x=problem.upper_x[free]
     )
