@@ -3,6 +3,8 @@
 import math
 from array import array
 from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,10 +153,7 @@ def request_of_message(message: GaitMessage) -> GaitRequest:
 def certificate_to_message(certificate: Certificate) -> CertificateMessage:
     """Return a certificate as a message."""
     return CertificateMessage(
-        family=[entry.family for entry in certificate.entries],
-        violation=[entry.violation for entry in certificate.entries],
-        tolerance=[entry.tolerance for entry in certificate.entries],
-        unit=[entry.unit for entry in certificate.entries],
+        **_columns(certificate.entries, ("family", "violation", "tolerance", "unit")),
         certified=certificate.certified,
     )
 
@@ -173,60 +172,38 @@ def certificate_from_message(message: CertificateMessage) -> Certificate:
 
 def report_to_message(report: SolveReport) -> SolverReportMessage:
     """Return a solver report as a message."""
-    return SolverReportMessage(
-        status=report.status.value,
-        message=report.message,
-        back_end=report.back_end,
-        start=report.start,
-        starts=report.starts,
-        iterations=report.iterations,
-        solve_time=report.solve_time,
-        objective=report.objective,
-        family=[entry.family for entry in report.violations],
-        violation=[entry.violation for entry in report.violations],
-        unit=[entry.unit for entry in report.violations],
-    )
+    columns = _columns(report.violations, ("family", "violation", "unit"))
+    return _message(SolverReportMessage, report, status=report.status.value, **columns)
 
 
 def report_from_message(message: SolverReportMessage) -> SolveReport:
     """Return the solver report of a message."""
     rows = zip(message.family, message.violation, message.unit, strict=True)
-    return SolveReport(
-        status=Status(message.status),
-        message=message.message,
-        back_end=message.back_end,
-        start=message.start,
-        starts=message.starts,
-        iterations=message.iterations,
-        solve_time=message.solve_time,
-        objective=message.objective,
-        violations=tuple(FamilyViolation(*row) for row in rows),
-    )
+    values: dict[str, Any] = {
+        "status": Status(message.status),
+        "violations": tuple(FamilyViolation(*row) for row in rows),
+    }
+    same = {one.name for one in fields(SolveReport)} - values.keys()
+    return SolveReport(**values, **{name: getattr(message, name) for name in same})
 
 
 def progress_to_message(progress: Progress, time_limit: float) -> OptimizeGaitAction.Feedback:
     """Return progress of a solve that may last `time_limit` in [s] as action feedback."""
-    return OptimizeGaitAction.Feedback(
-        stage=progress.stage,
-        iteration=progress.iteration,
-        objective=float(progress.objective),
-        infeasibility=float(progress.infeasibility),
-        elapsed=float(progress.elapsed),
-        time_left=max(time_limit - float(progress.elapsed), 0.0),
-    )
+    time_left = max(time_limit - progress.elapsed, 0.0)
+    return _message(OptimizeGaitAction.Feedback, progress, time_left=time_left)
 
 
 def summary_to_message(summary: GaitSummary) -> GaitSummaryMessage:
     """Return a row of the gait table as a message."""
-    return GaitSummaryMessage(
-        speed=summary.speed,
-        step_length=summary.step_length,
-        step_time=summary.step_time,
-        spring_mode=summary.spring_mode.value,
-        stiffness=summary.stiffness,
-        equilibrium=summary.equilibrium,
-        objective=summary.objective,
-        relative_objective=summary.relative_objective,
-        points=summary.points,
-        certified=summary.certified,
-    )
+    return _message(GaitSummaryMessage, summary, spring_mode=summary.spring_mode.value)
+
+
+def _message(kind: type, value: object, **given: Any) -> Any:
+    """Return a message with the fields given, all others being attributes of a value by the same name."""
+    names = kind.get_fields_and_field_types().keys() - given.keys()  # type: ignore[attr-defined]
+    return kind(**given, **{name: getattr(value, name) for name in names})
+
+
+def _columns(entries: Sequence[FamilyViolation], names: Sequence[str]) -> dict[str, list[Any]]:
+    """Return attributes of entries as the parallel arrays of a message."""
+    return {name: [getattr(entry, name) for entry in entries] for name in names}
