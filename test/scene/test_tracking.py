@@ -1,5 +1,7 @@
 """The floating base is found from joint positions alone, and feet, paths and forces are the gait's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,8 +21,7 @@ SPEED, MODE = 0.32, "stiffness_and_equilibrium"
 def solved(request):
     """A packaged gait, and it as displays show it, with and without its refinement."""
     gait, _ = GaitLibrary(WALKER).find(SPEED, MODE, "nearest")
-    refined = gait.refined if request.param == "refined" else None
-    shown = ShownGait(WALKER, gait.trajectory, gait.step_length, gait.request.step_time, refined)
+    shown = ShownGait(gait if request.param == "refined" else replace(gait, refined=None))
     return gait, shown
 
 

@@ -18,11 +18,11 @@ from walk_optimizer.description.skeleton import skeleton_of
 from walk_optimizer.description.transforms import base_transform, link_transforms
 from walk_optimizer.description.urdf import walker_urdf
 from walk_optimizer.errors import ConfigurationError, WalkOptimizerError
-from walk_optimizer.nodes.conversions import refined_from_message, trajectory_from_message
 from walk_optimizer.nodes.parameters import Setting
 from walk_optimizer.nodes.qos import LATCHED, STREAM
 from walk_optimizer.nodes.running import run_node
 from walk_optimizer.nodes.scene_markers import SceneMarkers
+from walk_optimizer.nodes.streamed_gait import StreamedGait
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.transform_messages import transforms_to_message
 from walk_optimizer.nodes.visualizer_health import VisualizerHealth
@@ -110,13 +110,7 @@ class WalkerVisualizerNode(SuiteNode):
 
     def _take_gait(self, message: GaitMessage) -> None:
         try:
-            gait = ShownGait(
-                self._walker,
-                trajectory_from_message(message),
-                message.step_length,
-                message.step_time,
-                refined_from_message(message),
-            )
+            gait = ShownGait(StreamedGait.from_message(message, self._walker).gait)
         except WalkOptimizerError as error:
             self.get_logger().warning(f"gait not shown: {error}")
             return

@@ -6,11 +6,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.gait import RefinedGait, Trajectory
-from walk_optimizer.gait_files.checks import positive
+from walk_optimizer.gait import Gait
 from walk_optimizer.mechanics import foot_arm
-from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.profile import EulerProfile, RefinedProfile, StepProfile, most_accurate
+from walk_optimizer.profile import RefinedProfile, StepProfile, profile_of
 from walk_optimizer.references import sample_cycle
 
 FloatArray = NDArray[np.float64]
@@ -37,34 +35,19 @@ class Place:
 
 
 class ShownGait:
-    """A gait and its walker."""
+    """A gait, as it is walked."""
 
-    def __init__(
-        self,
-        walker: WalkerParameters,
-        trajectory: Trajectory,
-        step_length: float,
-        step_time: float,
-        refined: RefinedGait | None,
-    ) -> None:
-        """Take a gait.
+    def __init__(self, gait: Gait) -> None:
+        """Tabulate the cycle.
 
         Args:
-            walker: That walks.
-            trajectory: On the report's grid.
-            step_length: Of that trajectory in [m].
-            step_time: In [s].
-            refined: Shown instead, where it is certified.
+            gait: Its refined part is shown if that is certified.
 
         Raises:
-            GaitFileError: length or time are no finite positive numbers.
             InvalidRequestError: the step is much shorter or longer than any walker's.
         """
-        positive(step_length, "step_length")
-        positive(step_time, "step_time")
-        self.walker = walker
-        self._trajectory, self._refined = trajectory, refined
-        self.profile: StepProfile = most_accurate(EulerProfile(trajectory, step_length, step_time), refined)
+        self.profile: StepProfile = profile_of(gait)
+        self._gait = gait
         self._cycle = sample_cycle(self.profile, _TABLE_POINTS / (2 * self.profile.step_time))
 
     def locate(self, position: FloatArray) -> Place:
@@ -92,7 +75,7 @@ class ShownGait:
     def swing_path(self) -> FloatArray:
         """The foot of leg 2 over a step, from where the foot of leg 1 stands: x, y in [m], (2, K)."""
         q = np.column_stack([self.profile.sample(time).q for time in self.path_times.tolist()])
-        stance, swing = (foot_arm(self.walker, q, leg).position for leg in range(2))
+        stance, swing = (foot_arm(self._gait.walker, q, leg).position for leg in range(2))
         path: FloatArray = swing - stance
         return path
 
@@ -113,9 +96,9 @@ class ShownGait:
         Returns:
             (2, 2): rows are the foot that stands and the one that swings, columns x and y.
         """
-        if self._refined is not None and isinstance(self.profile, RefinedProfile):
-            refined = self._refined.trajectory
-            return refined.force(*refined.locate(time)).reshape(2, 2)
-        index = int(np.searchsorted(self._trajectory.time, time))
-        net = self._trajectory.net_reaction()
+        refined, euler = self._gait.refined, self._gait.trajectory
+        if refined is not None and isinstance(self.profile, RefinedProfile):
+            return refined.trajectory.force(*refined.trajectory.locate(time)).reshape(2, 2)
+        index = int(np.searchsorted(euler.time, time))
+        net = euler.net_reaction()
         return net[:, min(index, net.shape[1] - 1)].reshape(2, 2)
