@@ -19,9 +19,9 @@ def shared_file(*names: str) -> PathJoinSubstitution:
     return PathJoinSubstitution([FindPackageShare("walk_optimizer"), *names])
 
 
-def use_sim_time() -> dict[str, ParameterValue]:
-    """Return the parameter that all nodes share."""
-    return {"use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)}
+def switches(*names: str) -> dict[str, ParameterValue]:
+    """Return the parameters that have launch arguments of the same names."""
+    return {name: ParameterValue(LaunchConfiguration(name), value_type=bool) for name in names}
 
 
 def walker_node(name: str, condition: Condition | None = None) -> Node:
@@ -31,7 +31,8 @@ def walker_node(name: str, condition: Condition | None = None) -> Node:
         executable=name,
         name=name,
         namespace=LaunchConfiguration("namespace"),
-        parameters=[shared_file("config", f"{name}.yaml"), use_sim_time()],
+        # Nodes without a life cycle have no parameter autostart, and ROS does not mind.
+        parameters=[shared_file("config", f"{name}.yaml"), switches("use_sim_time", "autostart")],
         # Without SROS2 an enclave is but a name.
         ros_arguments=["--log-level", LaunchConfiguration("log_level"), "--enclave", f"{ENCLAVES}/{name}"],
         output="screen",
@@ -48,7 +49,7 @@ def rviz_node() -> Node:
         namespace=LaunchConfiguration("namespace"),
         arguments=["-d", shared_file("rviz", "walker.rviz")],
         ros_arguments=["--enclave", f"{ENCLAVES}/operator"],
-        parameters=[use_sim_time()],
+        parameters=[switches("use_sim_time")],
         remappings=[("/tf", "tf"), ("/tf_static", "tf_static")],
         condition=IfCondition(LaunchConfiguration("rviz")),
     )
@@ -59,6 +60,9 @@ def generate_launch_description() -> LaunchDescription:
     arguments = [
         DeclareLaunchArgument("namespace", default_value="", description="Namespace of the nodes."),
         DeclareLaunchArgument("use_sim_time", default_value="false", description="Take time from /clock."),
+        DeclareLaunchArgument(
+            "autostart", default_value="true", description="false: a manager starts library and publisher."
+        ),
         DeclareLaunchArgument("log_level", default_value="info", description="debug, info, warn or error."),
         DeclareLaunchArgument("visualize", default_value="false", description="Also walker_visualizer."),
         DeclareLaunchArgument("rviz", default_value="false", description="Also walker_visualizer and RViz."),
