@@ -287,8 +287,8 @@ def page(seconds, calls):
 {head}
 
 Measured by `benchmarks/reference_stream.py`, {seconds:g} s a run, beside a bare rclpy timer that publishes
-the same message and nothing else. The publisher also publishes torques and commands at each tick. Lateness and
-age are the 50th, 99th and 99.9th percentile; ratios are those of the rate and of the 99th percentiles.
+the same message and nothing else. The publisher also publishes torques and commands at each tick. Lateness
+and age are the 50th, 99th and 99.9th percentile; ratios are those of the rate and of the 99th percentiles.
 
 {stream_table(bare, runs, recording)}
 
