@@ -51,8 +51,13 @@ class TransitionAnswer:
 
 
 def transition_job(job: TransitionJob, progress: ProgressCallback) -> TransitionAnswer:
-    """Do a job, in the worker process."""
+    """Do a job in the worker process."""
     os.setpriority(os.PRIO_PROCESS, 0, _NICENESS)
+    return planned(job, progress)
+
+
+def planned(job: TransitionJob, progress: ProgressCallback | None = None) -> TransitionAnswer:
+    """Return solved steps of the table, or solve and keep them."""
     table = TransitionTable(job.source.walker, job.folder)
     known = table.find(job.source, job.target)
     if known is not None and known.peak_torques.max() <= job.torque_limit:
