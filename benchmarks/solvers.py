@@ -213,6 +213,11 @@ _TITLE = f"""# Solvers
 What each back end does on the report's programs, from the same starts. `config/solver.yaml` or
 `walk-optimizer solve --solver NAME` chooses one.
 
+In short: IPOPT is the default, since it solves what the others do not, and sooner. With a given schedule
+every back end finds the same optimum on coarse grids. Uno takes the fewest iterations, and ends exactly on
+its bounds, but its quadratic programs become slow from N = 50 on. fatrop and SNOPT solve schedules, and not
+the complementarity problem.
+
 A solve has *converged* if its solver says so and every residual of our own certificate is within its
 tolerance; *worst residual* is in units of that tolerance. F is in (N m)^2. A solver counts what it calls
 iterations; for SNOPT these are evaluations. A solve may take {TIME_LIMIT:.0f} s of processor time. fatrop and
