@@ -189,7 +189,7 @@ def test_damaged_files_are_set_aside_and_solved_again(graph, start, stocked, mon
     write_gait_file(torn, paths[0])
     write_gait_file(others, paths[2])
     with monkeypatch.context() as patch:
-        patch.setattr(codec, "VERSION", 9)
+        patch.setattr(codec, "GAIT_FORMAT", replace(codec.GAIT_FORMAT, version=9))
         write_gait_file(newer, paths[1])
     paths[0].write_bytes(paths[0].read_bytes()[:-500])
     node = start("gait_library", **stocked)
