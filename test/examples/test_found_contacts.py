@@ -20,7 +20,7 @@ from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.status import Status
 
 WALKER = WalkerParameters(terrain=Terrain(step_up=0.02))
-REQUEST = GaitRequest(0.25, 0.785, SpringMode.NONE, 20)
+REQUEST = GaitRequest(0.25, 0.785, SpringMode.NONE, 16)
 SHAPE = GuessShape(0.05, 0.03)
 
 
@@ -30,7 +30,7 @@ def test_the_guess_does_not_say_which_foot_stands():
 
 
 def test_on_stairs_contacts_are_found_and_certified():
-    gait = find_contacts(WALKER, REQUEST, [SHAPE], SolveSession(solver_settings(), 300.0, None))
+    gait = find_contacts(WALKER, REQUEST, SHAPE, SolveSession(solver_settings(), 300.0, None))
     assert gait.finding.certificate.certified
     standing = gait.finding.schedule != FootMode.FREE
     assert standing.any(axis=1).any()

@@ -29,7 +29,7 @@ TERRAINS = {
 NAMES = ("standing-start", *TERRAINS, "finger")
 # A step of the table's second speed, on a coarse grid.
 _STEP = GaitRequest(step_length=0.25, step_time=0.785, spring_mode=SpringMode.NONE, points=50)
-_SHAPES = (GuessShape(clearance=0.02, flexion=0.002), GuessShape(clearance=0.05, flexion=0.03))
+_SHAPE = GuessShape(clearance=0.05, flexion=0.03)
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def solve_example(name: str, time_limit: float | None = None) -> Example:
         disc = move_disc(Finger(), FingerTask(), session)
         return Example(disc.finding, lambda path: pictures.draw_finger(disc, path))
     if name in TERRAINS:
-        gait = find_contacts(WalkerParameters(terrain=TERRAINS[name]), _STEP, _SHAPES, session)
+        gait = find_contacts(WalkerParameters(terrain=TERRAINS[name]), _STEP, _SHAPE, session)
         return Example(gait.finding, lambda path: pictures.draw_walk(gait, path))
     if name == "standing-start":
         start = set_off(WalkerParameters.from_yaml(), StandingStart(), session)

@@ -8,7 +8,7 @@ import numpy as np
 from walk_optimizer.certificate import certify, landing_distance
 from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.examples.finding import Finding
-from walk_optimizer.examples.relaxation import follow_relaxation
+from walk_optimizer.examples.relaxation import RELAXATIONS, follow_relaxation
 from walk_optimizer.gait import Trajectory
 from walk_optimizer.guess import FloatArray, GuessShape, kinematic_guess
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
@@ -45,18 +45,22 @@ def unscheduled_guess(walker: WalkerParameters, request: GaitRequest, shape: Gue
 
 
 def find_contacts(
-    walker: WalkerParameters, request: GaitRequest, shapes: Sequence[GuessShape], session: SolveSession
+    walker: WalkerParameters, request: GaitRequest, shape: GuessShape, session: SolveSession
 ) -> TerrainGait:
-    """Return the best periodic gait that complementarity alone leads to, from several guesses.
+    """Return the better periodic gait of two that complementarity alone leads to.
 
-    Those whose certificates fail come last.
+    They differ in how far the problem is relaxed at first. One whose certificate fails comes last.
     """
-    gaits = [_found(walker, request, shape, session) for shape in shapes]
+    gaits = [_found(walker, request, shape, RELAXATIONS[skipped:], session) for skipped in (0, 1)]
     return min(gaits, key=lambda one: (not one.finding.certificate.certified, one.finding.effort))
 
 
 def _found(
-    walker: WalkerParameters, request: GaitRequest, shape: GuessShape, session: SolveSession
+    walker: WalkerParameters,
+    request: GaitRequest,
+    shape: GuessShape,
+    relaxations: Sequence[float],
+    session: SolveSession,
 ) -> TerrainGait:
     begin = session.elapsed
     x, solves = follow_relaxation(
@@ -64,6 +68,7 @@ def _found(
         to_scaled(walker, unscheduled_guess(walker, request, shape), KneeSpring()),
         session,
         torque_unit(walker) ** 2,
+        relaxations,
     )
     points, spring = from_scaled(walker, x)
     trajectory = Trajectory.from_stacked(points, request.step_time)

@@ -20,8 +20,9 @@ class Terrain:
     """The ground under a walker whose stance foot stands at the origin.
 
     The ground has the height tan(slope) x + step_up (s - sin(2 pi s) / (2 pi)) with s = x / tread. A
-    tread is as long as the step, so that the feet stand in the middle of treads, where the second term
-    rises by `step_up` from one to the next and has neither slope nor curvature.
+    tread is as long as the step. A foot that lands as the step ends stands in the middle of a tread, where
+    the second term has neither slope nor curvature. Forces and slip are along and normal to the slope
+    everywhere: on stairs the footing is as on terraces, level wherever a foot stands.
 
     Attributes:
         slope: Inclination of the surface in [rad]; uphill is positive.
