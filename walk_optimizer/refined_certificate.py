@@ -4,13 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.certificate import RELATIVE_TOLERANCE, spring_entries, tread_entries
-from walk_optimizer.contact.schedule import LEAST_SLIP_SPEED
 from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
 from walk_optimizer.mechanics import Mechanics, along_and_normal, foot_arm, mechanics_at
 from walk_optimizer.model.kinematics import RELABELLED
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.refined_trajectory import RefinedTrajectory
-from walk_optimizer.replay import interval_errors
+from walk_optimizer.replay import HELD_SPEED, interval_errors
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.transcription.tableau import DIFFERENTIATION, STAGES
 
@@ -141,7 +140,7 @@ def _slipping(speeds: FloatArray) -> NDArray[np.bool_]:
         speeds: Magnitudes of the tangential velocities of both feet in [m/s], (2, 3 n).
     """
     fastest = speeds.reshape(2, -1, STAGES).max(axis=2)
-    return np.repeat(fastest > LEAST_SLIP_SPEED, STAGES, axis=1)
+    return np.repeat(fastest > HELD_SPEED, STAGES, axis=1)
 
 
 def _slip_entries(

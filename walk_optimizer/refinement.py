@@ -15,8 +15,14 @@ from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.status import Status
-from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
-from walk_optimizer.transcription.phases import INSTANT_POINTS, Phase, phases_of, without_instants
+from walk_optimizer.transcription.mesh import Mesh, RefinedPoints, without_vanished
+from walk_optimizer.transcription.phases import (
+    INSTANT_POINTS,
+    Phase,
+    phases_of,
+    with_steady_end,
+    without_brief_modes,
+)
 from walk_optimizer.transcription.refined import RefinedProblem
 from walk_optimizer.transcription.scaling import torque_unit
 
@@ -24,8 +30,8 @@ FloatArray = NDArray[np.float64]
 
 _INITIAL_INTERVALS = 24
 _FEWEST_INTERVALS = 3
-_MOST_PHASES = 5
-_ROUNDS = 4
+_MOST_PHASES = 6
+_ROUNDS = 6
 # Barrier parameter for a start from the report's grid or from a coarser mesh.
 _BARRIER = 1e-5
 
@@ -40,6 +46,7 @@ class RefinedSolution:
         trajectory: The step; None unless it was solved.
         spring: K and q_eq.
         local_error: Largest error of an interval in [rad] or [m]; infinite before it is estimated.
+        met: Whether the mesh is fine enough for the error.
     """
 
     status: Status
@@ -47,6 +54,7 @@ class RefinedSolution:
     trajectory: RefinedTrajectory | None
     spring: KneeSpring
     local_error: float = np.inf
+    met: bool = False
 
     @property
     def effort(self) -> float:
@@ -88,9 +96,27 @@ class _Refinement:
         self.gait, self.session, self.walker, self.request = gait, session, gait.walker, gait.request
 
     def run(self) -> RefinedSolution:
-        """Return the best of the contact plans, on a mesh fine enough for its error."""
-        solutions = [self._solved(mesh, self._initial_points(mesh)) for mesh in self._initial_meshes()]
-        best = min(solutions, key=lambda one: one.effort)
+        """Return the best of the contact plans that are solved on a mesh fine enough for their error."""
+        solutions = [self._begun(mesh) for mesh in self._initial_meshes()]
+        best, *others = sorted(solutions, key=lambda one: one.effort)
+        adapted = self._adapted(best)
+        while not adapted.met and others and not self.session.stopped:
+            adapted = self._adapted(others.pop(0))
+        return adapted
+
+    def _begun(self, mesh: Mesh) -> RefinedSolution:
+        """Return the solution on an initial mesh, solved again without phases that shrink to nothing."""
+        solution = self._solved(mesh, self._initial_points(mesh))
+        if solution.trajectory is None:
+            return solution
+        lasting = without_vanished(mesh, solution.trajectory.breaks)
+        if lasting == mesh.phases:
+            return solution
+        mesh = _even_mesh(lasting)
+        return self._solved(mesh, self._initial_points(mesh))
+
+    def _adapted(self, best: RefinedSolution) -> RefinedSolution:
+        """Return a solution on a mesh that is divided until its error is small, or whatever fails there."""
         for _ in range(_ROUNDS):
             mesh, trajectory = best.mesh, best.trajectory
             if trajectory is None:
@@ -98,13 +124,13 @@ class _Refinement:
             errors = MeshErrors.of(self.walker, self.request.step_length, best.spring, trajectory)
             best = replace(best, local_error=float(errors.local.max()))
             if errors.met:
-                return best
+                return replace(best, met=True)
             finer = errors.divided(mesh)
             best = self._solved(finer, resampled(trajectory, best.spring, mesh, finer))
         return best
 
     def _initial_meshes(self) -> list[Mesh]:
-        """Return even meshes of the gait's own phases, of those without instants, and of single support.
+        """Return even meshes of the gait's own phases, of those without brief ones, and of single support.
 
         Contacts of the report's grid that last an instant, and the brushing of a swing foot, are often
         made by its coarseness: what is left without them may be as good or better.
@@ -113,9 +139,10 @@ class _Refinement:
         schedule = schedule_of(
             self.walker, self.request.step_length, trajectory.q, trajectory.p, trajectory.reaction
         )
-        schedules = (schedule, without_instants(schedule), single_impact(trajectory.points))
+        steady = (with_steady_end(schedule), without_brief_modes(schedule))
+        schedules = (schedule, *steady, single_impact(trajectory.points))
         plans = dict.fromkeys(phases_of(one) for one in schedules)
-        return [_even_mesh(phases) for phases in plans if _is_followed(phases)]
+        return [_even_mesh(phases) for phases in plans if len(phases) <= _MOST_PHASES]
 
     def _initial_points(self, mesh: Mesh) -> RefinedPoints:
         """Interpolate the grid's states, torques and forces onto the mesh.
@@ -151,14 +178,6 @@ class _Refinement:
             return RefinedSolution(solution.status, mesh, None, points.spring)
         found = refined.unpack(solution.x)
         return RefinedSolution(Status.SOLVED, mesh, trajectory_on(mesh, found), found.spring)
-
-
-def _is_followed(phases: tuple[Phase, ...]) -> bool:
-    """Return whether phases are worth a solve: few enough, and no foot slips in an impact.
-
-    An impulse that slips is the coarse grid's picture of a slip that ends with the step.
-    """
-    return len(phases) <= _MOST_PHASES and not any(mode.slips for one in phases for mode in one.impact)
 
 
 def _even_mesh(phases: tuple[Phase, ...]) -> Mesh:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from walk_optimizer.contact.schedule import LEAST_SLIP_SPEED, FootMode
+from walk_optimizer.contact.schedule import FootMode
 from walk_optimizer.mechanics import mechanics_at
 from walk_optimizer.model import dynamics, ground
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
@@ -24,6 +24,8 @@ FloatArray = NDArray[np.float64]
 _TOLERANCES = {"rtol": 1e-10, "atol": 1e-10}
 # Feet that stand or slip are held on the surface that they are on: of the ground its slope counts.
 _ANY_TREAD = 1.0
+# A foot under load that moves no faster than this sticks, in [m/s].
+HELD_SPEED = 1e-6
 
 
 @cache
@@ -103,7 +105,7 @@ def _mode(forces: FloatArray, slip: FloatArray) -> FootMode:
     if not forces.any():
         return FootMode.FREE
     fastest = slip[np.argmax(np.abs(slip))]
-    if abs(fastest) <= LEAST_SLIP_SPEED:
+    if abs(fastest) <= HELD_SPEED:
         return FootMode.STICK
     return FootMode.SLIP_FORWARD if fastest > 0 else FootMode.SLIP_BACKWARD
 

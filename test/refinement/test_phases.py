@@ -37,6 +37,16 @@ def test_double_support_that_lasts_is_a_phase() -> None:
     assert not second.begins_with_impact
 
 
+def test_a_foot_that_slips_as_the_step_ends_takes_no_impulse() -> None:
+    schedule = single_impact(50)
+    schedule[0, 20:30] = FootMode.SLIP_FORWARD
+    schedule[0, -1] = FootMode.SLIP_BACKWARD
+    phases = phases_of(schedule)
+    assert [phase.modes[0] for phase in phases] == [STICK, FootMode.SLIP_FORWARD, STICK]
+    assert phases[0].impact == (STICK, FREE)
+    assert not any(phase.begins_with_impact for phase in phases[1:])
+
+
 def test_flight_ends_with_an_impact() -> None:
     schedule = single_impact(50)
     schedule[0, 20:30] = FREE

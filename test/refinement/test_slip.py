@@ -15,7 +15,7 @@ from walk_optimizer.replay import contact_modes
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
-from walk_optimizer.transcription.phases import phases_of, without_instants
+from walk_optimizer.transcription.phases import phases_of, with_steady_end, without_brief_modes
 
 REQUEST = GaitRequest.for_speed(0.3185, "none", 60)
 
@@ -67,8 +67,9 @@ def test_friction_that_does_not_oppose_the_slip_fully_is_found(slippery):
     assert "slip_friction" in {entry.family for entry in certificate.failures()}
 
 
-def test_what_a_foot_does_for_an_instant_counts_as_before():
+def test_what_a_foot_does_briefly_counts_as_before():
     free, stick, slip = FootMode.FREE, FootMode.STICK, FootMode.SLIP_BACKWARD
     schedule = np.array([[stick] * 8 + [slip] * 2, [stick] + [free] * 4 + [slip] + [free] * 4], dtype=np.int8)
     expected = [[stick] * 10, [stick] + [free] * 9]
-    np.testing.assert_array_equal(without_instants(schedule), expected)
+    np.testing.assert_array_equal(without_brief_modes(schedule), expected)
+    np.testing.assert_array_equal(with_steady_end(schedule), [expected[0], schedule[1]])

@@ -1,6 +1,6 @@
 """The mesh of a refined step, and the values on it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,9 @@ from walk_optimizer.transcription.phases import Phase
 from walk_optimizer.transcription.tableau import NODES_WITH_START
 
 FloatArray = NDArray[np.float64]
+
+# No phase is shorter, in [s].
+SHORTEST_PHASE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,3 +84,25 @@ class Mesh:
     def lengths(self, durations: FloatArray) -> FloatArray:
         """Return the lengths of all intervals in [s], (n,), for durations of the phases in [s]."""
         return np.concatenate([part * time for part, time in zip(self.parts, durations, strict=True)])
+
+
+def without_vanished(mesh: Mesh, breaks: FloatArray) -> tuple[Phase, ...]:
+    """Return the phases without those that are as short as may be, of a solution on the mesh.
+
+    Phases that begin with an impact stay. Where the feet then do the same in two phases without an
+    impact between them, these become one.
+
+    Args:
+        mesh: Phases and intervals.
+        breaks: Ends of the solution's intervals in [s], (n + 1,).
+    """
+    starts = breaks[mesh.first_intervals]
+    durations = np.diff([*starts, breaks[-1]])
+    kept: list[Phase] = []
+    for phase, start, duration in zip(mesh.phases, starts, durations, strict=True):
+        vanished = duration < 2 * SHORTEST_PHASE or bool(kept and kept[-1].modes == phase.modes)
+        if phase.begins_with_impact or not vanished:
+            kept.append(replace(phase, start=float(start / breaks[-1])))
+    if len(kept) == len(mesh.phases):
+        return mesh.phases
+    return tuple(kept)

@@ -9,6 +9,8 @@ from walk_optimizer.contact.schedule import FootMode, Schedule
 
 # A contact that lasts no longer than this many grid points is an impulse on the refined grid.
 INSTANT_POINTS = 2
+# What a foot does for no more than this part of the step may be left out: brushes, slips as it lifts off.
+BRIEF_PART = 0.04
 Modes = tuple[FootMode, FootMode]
 # Which feet land.
 Landing = tuple[bool, bool]
@@ -41,7 +43,9 @@ def phases_of(schedule: Schedule) -> tuple[Phase, ...]:
     """Return the phases of a schedule (2, N), the first one beginning with the step.
 
     Runs of a few points become part of the impact of the phase after them. Wherever a foot makes
-    contact anew, every foot that stands then or right after takes part in the impact.
+    contact anew, every foot that stands then or right after takes part in the impact. Of feet that slip
+    only those that land take part, and stick in it: impulses that slip are the coarse grid's picture of a
+    slip that ends with the step.
     """
     runs = _runs(schedule)
     last = max(index for index, (length, _) in enumerate(runs) if length > INSTANT_POINTS)
@@ -57,22 +61,42 @@ def phases_of(schedule: Schedule) -> tuple[Phase, ...]:
         seen = [*instant, modes]
         contacts = _first_contacts(seen)
         first, second = (not before[foot] and bool(contacts[foot]) for foot in range(2))
-        impact = contacts if first or second else (FootMode.FREE, FootMode.FREE)
+        hit = contacts if first or second else (FootMode.FREE, FootMode.FREE)
+        impact = _in_impact(hit[0], lands=first), _in_impact(hit[1], lands=second)
         phases.append(Phase(modes, impact, (first, second), start / schedule.shape[1]))
         before, instant = modes, []
         start += length
     return tuple(phases)
 
 
-def without_instants(schedule: Schedule) -> Schedule:
-    """Return the schedule in which what a foot does for an instant, but at the start, counts as before it."""
+def _in_impact(mode: FootMode, *, lands: bool) -> FootMode:
+    """Return what a foot does in an impact."""
+    return (FootMode.STICK if lands else FootMode.FREE) if mode.slips else mode
+
+
+def without_brief_modes(schedule: Schedule) -> Schedule:
+    """Return the schedule in which what a foot does briefly, but at the start, counts as before it."""
     steady = schedule.copy()
     for modes in steady:
         changes = np.flatnonzero(np.diff(modes)) + 1
         for start, end in pairwise([*changes.tolist(), modes.size]):
-            if end - start <= INSTANT_POINTS:
+            if end - start <= _longest_brief(schedule):
                 modes[start:end] = modes[start - 1]
     return steady
+
+
+def with_steady_end(schedule: Schedule) -> Schedule:
+    """Return the schedule in which what a foot does briefly as the step ends counts as before it."""
+    steady = schedule.copy()
+    for modes in steady:
+        last = int(np.max(np.flatnonzero(np.diff(modes)), initial=-1)) + 1
+        if last and modes.size - last <= _longest_brief(schedule):
+            modes[last:] = modes[last - 1]
+    return steady
+
+
+def _longest_brief(schedule: Schedule) -> float:
+    return max(float(INSTANT_POINTS), BRIEF_PART * float(schedule.shape[1]))
 
 
 def _runs(schedule: Schedule) -> list[tuple[int, Modes]]:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.transcription import radau
 from walk_optimizer.transcription.layout import STATE_WIDTH
-from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
+from walk_optimizer.transcription.mesh import SHORTEST_PHASE, Mesh, RefinedPoints
 from walk_optimizer.transcription.phase_bounds import force_bounds
 from walk_optimizer.transcription.problems import state_bounds
 from walk_optimizer.transcription.scaling import point_units, spring_units, torque_unit
@@ -16,7 +16,6 @@ FloatArray = NDArray[np.float64]
 
 # The first of the shared variables are K and q_eq, then follows the duration of each phase in [s].
 SPRING_VARIABLES = (0, 1)
-_SHORTEST_PHASE = 1e-3
 
 
 class RefinedVariables:
@@ -79,7 +78,7 @@ class RefinedVariables:
                     states=np.broadcast_to(states[side], (count, STAGES + 1, STATE_WIDTH)),
                     torques=np.full((count, STAGES, 3), (-torque_limit, torque_limit)[side]),
                     forces=np.repeat(forces[side][:, None, :], STAGES, axis=1),
-                    durations=np.full(phases, (_SHORTEST_PHASE, np.inf)[side]),
+                    durations=np.full(phases, (SHORTEST_PHASE, np.inf)[side]),
                     impulses=impulses[side],
                     spring=springs[side],
                 )
