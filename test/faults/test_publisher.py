@@ -1,6 +1,7 @@
 """Faults of commands, parameters, clocks, disks and processes that the publisher has to survive."""
 
 import math
+import os
 import resource
 import signal
 
@@ -12,12 +13,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from nodes.conftest import FAST, SLOW, stock
-from nodes.walking import NODE, Walker, assert_continuous, stamp_ns
+from nodes.graph import assert_left_cleanly, children_of, exists, is_worker
+from nodes.walking import MODE, NODE, Walker, assert_continuous, stamp_ns
 from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
-from walk_optimizer_interfaces.srv import StartRecording, StopRecording
+from walk_optimizer_interfaces.srv import SetGait, StartRecording, StopRecording
 
 from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.nodes.publisher_settings import SETTINGS
@@ -198,3 +200,43 @@ def test_the_stream_goes_on_when_the_disk_is_full(graph, own, tmp_path):
     info = describe_bag(tmp_path / "bag")
     assert info.is_whole
     assert info.message_count > 100
+
+
+@pytest.fixture
+def solving(graph, start, stocked, other_walker, tmp_path):
+    """A publisher that may solve for steps, and a gait that no steps lead to: a solve that lasts."""
+    start("gait_library", namespace=OWN, **stocked)
+    walker = Walker(graph, OWN)
+    walker.process = start(NODE, namespace=OWN, walker_file=other_walker, cache_folder=tmp_path)
+    walker.wait_for("standing")
+
+    def begin():
+        """Ask for the gait, and return the future answer and the worker once that is at work."""
+        future = graph.send(SetGait, walker.topic("set_gait"), speed=FAST, spring_mode=MODE)
+        graph.spin_until(lambda: workers(walker) or future.done(), "the worker")
+        assert not future.done(), future.result().message
+        return future, workers(walker)[0]
+
+    walker.begin_solve = begin
+    return walker
+
+
+def workers(walker):
+    return [child for child in children_of(walker.process.process.pid) if is_worker(child)]
+
+
+def test_a_solve_for_steps_may_lose_its_process_be_overtaken_and_end_with_the_node(graph, solving):
+    future, worker = solving.begin_solve()
+    os.kill(worker, signal.SIGKILL)
+    answer = graph.result(future)
+    assert (answer.success, "the worker process ended" in answer.message) == (False, True)
+    future, worker = solving.begin_solve()
+    solving.trigger("stop")
+    answer = graph.result(future)
+    assert (answer.success, answer.message) == (False, "a later command came first")
+    joints = solving.listen(JointState, "joint_reference")
+    _, worker = solving.begin_solve()
+    mark = len(joints)
+    graph.spin_until(lambda: len(joints) > mark + 50, "the stand being streamed")
+    assert_left_cleanly(solving.process, solving.process.stop(signal.SIGTERM))
+    assert not exists(worker)

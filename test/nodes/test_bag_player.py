@@ -55,7 +55,8 @@ def test_a_bag_is_played_as_it_was_recorded_and_never_faster(graph, bag):
         raw=True,
     )
     latched = graph.subscribe(String, GAIT.name, LATCHED)
-    player = play(bag, "--rate", str(RATE))
+    # On a busy machine discovery takes long.
+    player = play(bag, "--rate", str(RATE), "--delay", "4")
     graph.spin_until(lambda: player.poll() is not None, "the player")
     output = player.communicate()[0]
     graph.spin_for(0.3)
@@ -72,7 +73,7 @@ def test_topics_are_picked_and_wrong_ones_refused(graph, bag):
     player = play(bag, "--topics", "/nothing")
     assert player.wait(60) == 2
     assert "the bag has no topic /nothing; it has" in player.communicate()[0]
-    player = play(bag, "--topics", GAIT.name)
+    player = play(bag, "--delay", "0.1", "--topics", GAIT.name)
     assert "played 1 messages on 1 topics" in player.communicate(timeout=60)[0]
 
 

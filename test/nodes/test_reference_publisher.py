@@ -291,7 +291,7 @@ def test_a_bad_parameter_stops_the_start(start):
 def test_a_simulated_clock_that_jumps_moves_no_reference(graph, start, stocked):
     """Time stands still, runs, is reset, leaps and runs again: the walk holds, or goes on from there."""
     start("gait_library", **stocked)
-    start(NODE, use_sim_time=True, longest_gap=0.1, rate=500.0, transitions="blended")
+    start(NODE, use_sim_time=True, longest_gap=0.2, rate=500.0, transitions="blended")
     joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
     gaits = graph.subscribe(Gait, f"{NODE}/gait", LATCHED)
     clock = graph.publisher(Clock, "/clock")
@@ -300,7 +300,7 @@ def test_a_simulated_clock_that_jumps_moves_no_reference(graph, start, stocked):
         """Let the clock run until the stream has told of it, and return the last stamp in [ms]."""
         mark = len(joints)
         for _ in range(2000):
-            milliseconds += 5
+            milliseconds += 20
             seconds, rest = divmod(milliseconds, 1000)
             clock.publish(Clock(clock=Time(sec=seconds, nanosec=rest * 1_000_000)))
             graph.spin_for(0.005)

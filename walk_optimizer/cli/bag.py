@@ -53,6 +53,13 @@ def add_parser(verbs: Subparsers) -> None:
     play.add_argument(
         "--rate", type=float, default=1.0, metavar="X", help="times the recorded speed (default: 1)"
     )
+    play.add_argument(
+        "--delay",
+        type=float,
+        default=1.0,
+        metavar="SECONDS",
+        help="time for subscribers to find the player (default: %(default)s)",
+    )
     play.add_argument("--loop", action="store_true", help="begin anew at the end, until Ctrl-C")
     play.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these (default: all)")
     play.set_defaults(run=run_play)
@@ -86,6 +93,6 @@ def run_play(args: argparse.Namespace) -> int:
         from walk_optimizer.nodes.bag_player import play_bag
     except ImportError as error:
         raise MissingDependencyError(f"playing a bag needs ROS 2: {error}") from error
-    played = play_bag(args.bag, info, args.topics, args.rate, args.loop)
+    played = play_bag(args.bag, info, args.delay, args.topics, args.rate, args.loop)
     print(f"played {played.messages} messages on {played.topics} topics")
     return 0

@@ -19,13 +19,15 @@ from rclpy.qos import (
 )
 from rclpy.signals import SignalHandlerOptions
 
+from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.recording.info import BagInfo
 from walk_optimizer.recording.playback import messages_due, require_topics
 from walk_optimizer.recording.ros_messages import message_class
 from walk_optimizer.recording.topics import INFINITE_NS, QosProfile, TopicInfo
 
-# Subscribers need so long to find the player, in [s].
-_DISCOVERY = 1.0
+# Longest wait for what is still under way at the end, in [s].
+_LAST_WORDS = 1.0
+_LONGEST_DELAY = 3600.0
 # What a topic is given whose recording does not tell its history.
 _DEPTH = 10
 
@@ -44,35 +46,43 @@ class Playing:
 
 
 def play_bag(
-    path: Path, info: BagInfo, topics: Collection[str] | None = None, rate: float = 1.0, loop: bool = False
+    path: Path,
+    info: BagInfo,
+    delay: float,
+    topics: Collection[str] | None = None,
+    rate: float = 1.0,
+    loop: bool = False,
 ) -> Playing:
     """Play a bag, to its end or until Ctrl-C.
 
     Args:
         path: The bag.
         info: What is in it.
+        delay: Time for subscribers to find the player, in [s].
         topics: Names of the topics wanted; all when None.
         rate: Time of the recording for each time of playing.
         loop: Whether to begin anew at the end.
 
     Raises:
-        InvalidRequestError: the bag lacks a topic, or the rate is out of range.
+        InvalidRequestError: the bag lacks a topic, or rate or delay is out of range.
         MessageDefinitionError: a message type is not installed.
     """
     require_topics(info, topics or ())
+    if not 0 <= delay <= _LONGEST_DELAY:
+        raise InvalidRequestError(f"delay is {delay:g} s, allowed is 0 to {_LONGEST_DELAY:g} s")
     wanted = [topic for topic in info.topics if topics is None or topic.name in topics]
     messages = messages_due(path, topics, rate, loop)
     count = 0
     with _player() as node:
         publishers = {topic.name: _publisher(node, topic) for topic in wanted}
-        time.sleep(_DISCOVERY)
+        time.sleep(delay)
         for message, wait in messages:
             time.sleep(wait)
             publishers[message.topic.name].publish(message.data)
             count += 1
         # What is reliable may still be under way.
         for publisher in publishers.values():
-            publisher.wait_for_all_acked(Duration(seconds=_DISCOVERY))
+            publisher.wait_for_all_acked(Duration(seconds=_LAST_WORDS))
     return Playing(count, len(publishers))
 
 

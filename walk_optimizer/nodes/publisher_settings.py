@@ -5,6 +5,7 @@ from typing import Any
 
 from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.joint_limits import JointLimits, limits_of
+from walk_optimizer.library import Selection
 from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.nodes.parameters import NodeParameters, Setting
 from walk_optimizer.nodes.stream_messages import INTERFACES, TORQUES, StreamFormat
@@ -55,6 +56,12 @@ SETTINGS = [
         SpringMode.STIFFNESS_AND_EQUILIBRIUM.value,
         f"Knee springs of the gaits for ~/target_speed and ~/cmd_vel: {', '.join(SpringMode)}.",
         check=SpringMode.parse,
+    ),
+    Setting(
+        "selection",
+        Selection.EXACT.value,
+        "Which gait of the library a speed is walked with: exact, interpolated or nearest (see GetGait).",
+        check=_one_of(list(Selection)),
     ),
     Setting(
         "command_timeout",

@@ -10,7 +10,7 @@ from walk_optimizer.nodes.lifecycle import ManagedNode
 from walk_optimizer.nodes.remote_service import RemoteService
 from walk_optimizer.nodes.streamed_gait import StreamedGait
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
-from walk_optimizer.nodes.transition_planner import TransitionPlanner
+from walk_optimizer.nodes.transition_planner import NoTransitionError, TransitionPlanner
 from walk_optimizer.phase_clock import Motion
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.stand import StandProfile
@@ -89,14 +89,18 @@ class WalkCommands:
         """
         self._require_no_emergency()
         order = self._take_order()
-        gait = await self._fetch(request, order if wait_for_library else None)
+        gait, source = await self._fetch(request, order if wait_for_library else None)
         self._require_newest(order)
         peaks = peaks_of([gait.profile])
         self.limits.require(peaks)
-        await self._planner.plan(gait, self._stand_after(gait), self._torque_limit)
-        await self._lead_to(gait, order)
+        try:
+            await self._planner.plan(gait, self._stand_after(gait), self._torque_limit)
+            await self._lead_to(gait, order)
+        except NoTransitionError:
+            self._require_newest(order)  # Then a later command has cancelled the solve.
+            raise
         self._peaks = peaks
-        return f"{gait} from the next step on"
+        return f"{gait} from the next step on; {source}"
 
     def stop(self) -> str:
         """Have the walk come to a stand, and return a sentence about it; it waits for nothing."""
@@ -126,8 +130,8 @@ class WalkCommands:
         if order != self._newest:
             raise SupersededError("a later command came first")
 
-    async def _fetch(self, request: GaitRequest, waiting_as: int | None) -> StreamedGait:
-        """Return a gait of the library.
+    async def _fetch(self, request: GaitRequest, waiting_as: int | None) -> tuple[StreamedGait, str]:
+        """Return a gait of the library, and the sentence that it came with.
 
         Args:
             request: The gait.
@@ -136,7 +140,11 @@ class WalkCommands:
         Raises:
             WalkOptimizerError: the library refused, or is not there.
         """
-        wanted = GetGait.Request(speed=request.speed, spring_mode=request.spring_mode.value)
+        wanted = GetGait.Request(
+            speed=request.speed,
+            spring_mode=request.spring_mode.value,
+            selection=self._node.parameters["selection"],
+        )
         while True:
             try:
                 timeout = self._node.parameters["library_timeout"]
@@ -150,7 +158,7 @@ class WalkCommands:
             await self._node.sleep(_RETRY_PERIOD)
         if not answer.success:
             raise GaitNotFoundError(answer.message)
-        return StreamedGait.from_message(answer.gait, self._walker)
+        return StreamedGait.from_message(answer.gait, self._walker), answer.message
 
     async def _lead_to(self, goal: StreamedGait, order: int) -> None:
         """Have the stream walk to a gait from the pace that it then has."""
