@@ -23,7 +23,7 @@ LAYERS = (
     ("solve",),
     ("gait", "refined_trajectory"),
     ("certificate", "replay", "refined_certificate"),
-    ("search", "optimizer", "reference_solve", "refinement", "mesh_adaptation", "table_builder"),
+    ("search", "optimizer", "reference_solve", "refinement", "mesh_adaptation", "resolve", "table_builder"),
     ("gait_files", "gait_csv"),
     (
         "interpolation",

@@ -10,9 +10,10 @@ from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.gait import Certificate, Gait, RefinedGait
 from walk_optimizer.mechanics import foot_arm, horizontal_and_vertical
 from walk_optimizer.mesh_adaptation import MeshErrors, resampled, trajectory_on
-from walk_optimizer.model.parameters import KneeSpring
+from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints, without_vanished
@@ -32,8 +33,11 @@ _INITIAL_INTERVALS = 24
 _FEWEST_INTERVALS = 3
 _MOST_PHASES = 6
 _ROUNDS = 6
-# Barrier parameter for a start from the report's grid or from a coarser mesh.
-_BARRIER = 1e-5
+# Contact phases that the continuous problem does not have never converge; others need far fewer.
+_MOST_ITERATIONS = 200
+# Barrier parameters for a start from the report's grid, and from a refined solution.
+FROM_GRID = 1e-5
+REMESHED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +73,19 @@ def refined_gait(gait: Gait, session: SolveSession) -> RefinedGait | None:
         gait: The gait on the report's grid.
         session: Clock, cancelling and progress.
     """
-    solution = refine(gait, session)
+    return certified_refinement(gait.walker, gait.request, refine(gait, session))
+
+
+def certified_refinement(
+    walker: WalkerParameters, request: GaitRequest, solution: RefinedSolution
+) -> RefinedGait | None:
+    """Return a solution with its certificate; None where there is none or it fails."""
     if solution.trajectory is None:
         return None
     end = solution.trajectory.states[-1, -1][:6, None]
-    step_length = float(foot_arm(gait.walker, end, 1).position[0, 0])
+    step_length = float(foot_arm(walker, end, 1).position[0, 0])
     bare = RefinedGait(solution.trajectory, solution.spring, step_length, Certificate(()))
-    certificate = certify_refined(gait.walker, gait.request, bare)
+    certificate = certify_refined(walker, request, bare)
     return replace(bare, certificate=certificate) if certificate.certified else None
 
 
@@ -86,37 +96,44 @@ def refine(gait: Gait, session: SolveSession) -> RefinedSolution:
         gait: The gait on the report's grid: it gives phases and first guess.
         session: Clock, cancelling and progress.
     """
-    return _Refinement(gait, session).run()
+    solves = RefinedSolves(gait.request, gait.walker, session)
+    first = FirstGuess(gait)
+    solutions = [_begun(solves, first, mesh) for mesh in first.meshes()]
+    best, *others = sorted(solutions, key=lambda one: one.effort)
+    adapted = solves.adapted(best)
+    while not adapted.met and others and not session.stopped:
+        adapted = solves.adapted(others.pop(0))
+    return adapted
 
 
-class _Refinement:
-    """One gait's refinement."""
+def _begun(solves: "RefinedSolves", first: "FirstGuess", mesh: Mesh) -> RefinedSolution:
+    """Return the solution on an initial mesh, solved again without phases that shrink to nothing."""
+    solution = solves.solved(mesh, first.points(mesh), FROM_GRID)
+    if solution.trajectory is None:
+        return solution
+    lasting = without_vanished(mesh, solution.trajectory.breaks)
+    if lasting == mesh.phases:
+        return solution
+    mesh = even_mesh(lasting)
+    return solves.solved(mesh, first.points(mesh), FROM_GRID)
 
-    def __init__(self, gait: Gait, session: SolveSession) -> None:
-        self.gait, self.session, self.walker, self.request = gait, session, gait.walker, gait.request
 
-    def run(self) -> RefinedSolution:
-        """Return the best of the contact plans that are solved on a mesh fine enough for their error."""
-        solutions = [self._begun(mesh) for mesh in self._initial_meshes()]
-        best, *others = sorted(solutions, key=lambda one: one.effort)
-        adapted = self._adapted(best)
-        while not adapted.met and others and not self.session.stopped:
-            adapted = self._adapted(others.pop(0))
-        return adapted
+class RefinedSolves:
+    """The solves of the refined problem of a request."""
 
-    def _begun(self, mesh: Mesh) -> RefinedSolution:
-        """Return the solution on an initial mesh, solved again without phases that shrink to nothing."""
-        solution = self._solved(mesh, self._initial_points(mesh))
-        if solution.trajectory is None:
-            return solution
-        lasting = without_vanished(mesh, solution.trajectory.breaks)
-        if lasting == mesh.phases:
-            return solution
-        mesh = _even_mesh(lasting)
-        return self._solved(mesh, self._initial_points(mesh))
+    def __init__(self, request: GaitRequest, walker: WalkerParameters, session: SolveSession) -> None:
+        """Prepare.
 
-    def _adapted(self, best: RefinedSolution) -> RefinedSolution:
+        Args:
+            request: Speed, step and spring mode.
+            walker: The walker.
+            session: Clock, cancelling and progress.
+        """
+        self.request, self.walker, self.session = request, walker, session
+
+    def adapted(self, solution: RefinedSolution) -> RefinedSolution:
         """Return a solution on a mesh that is divided until its error is small, or whatever fails there."""
+        best = solution
         for _ in range(_ROUNDS):
             mesh, trajectory = best.mesh, best.trajectory
             if trajectory is None:
@@ -126,10 +143,41 @@ class _Refinement:
             if errors.met:
                 return replace(best, met=True)
             finer = errors.divided(mesh)
-            best = self._solved(finer, resampled(trajectory, best.spring, mesh, finer))
+            best = self.solved(finer, resampled(trajectory, best.spring, mesh, finer), REMESHED)
         return best
 
-    def _initial_meshes(self) -> list[Mesh]:
+    def solved(self, mesh: Mesh, points: RefinedPoints, barrier: float) -> RefinedSolution:
+        """Return the solution on one mesh.
+
+        Args:
+            mesh: Phases and intervals.
+            points: First guess.
+            barrier: First barrier parameter.
+        """
+        refined = RefinedProblem(self.request, self.walker, mesh)
+        unit = torque_unit(self.walker) ** 2 / self.request.interval
+        solution = self.session.solve(
+            refined.problem(),
+            refined.pack(points),
+            "refinement",
+            objective_unit=unit,
+            barrier=barrier,
+            maximum_iterations=_MOST_ITERATIONS,
+        )
+        if not solution.solved:
+            return RefinedSolution(solution.status, mesh, None, points.spring)
+        found = refined.unpack(solution.x)
+        return RefinedSolution(Status.SOLVED, mesh, trajectory_on(mesh, found), found.spring)
+
+
+class FirstGuess:
+    """What the report's grid knows of the refined solution."""
+
+    def __init__(self, gait: Gait) -> None:
+        """Take a gait on the report's grid."""
+        self.gait, self.walker, self.request = gait, gait.walker, gait.request
+
+    def meshes(self) -> list[Mesh]:
         """Return even meshes of the gait's own phases, of those without brief ones, and of single support.
 
         Contacts of the report's grid that last an instant, and the brushing of a swing foot, are often
@@ -142,9 +190,9 @@ class _Refinement:
         steady = (with_steady_end(schedule), without_brief_modes(schedule))
         schedules = (schedule, *steady, single_impact(trajectory.points))
         plans = dict.fromkeys(phases_of(one) for one in schedules)
-        return [_even_mesh(phases) for phases in plans if len(phases) <= _MOST_PHASES]
+        return [even_mesh(phases) for phases in plans if len(phases) <= _MOST_PHASES]
 
-    def _initial_points(self, mesh: Mesh) -> RefinedPoints:
+    def points(self, mesh: Mesh) -> RefinedPoints:
         """Interpolate the grid's states, torques and forces onto the mesh.
 
         The forces of the first points are impulses of the impact spread over an interval: the points
@@ -168,19 +216,8 @@ class _Refinement:
             spring=self.gait.spring,
         )
 
-    def _solved(self, mesh: Mesh, points: RefinedPoints) -> RefinedSolution:
-        refined = RefinedProblem(self.request, self.walker, mesh)
-        unit = torque_unit(self.walker) ** 2 / self.request.interval
-        solution = self.session.solve(
-            refined.problem(), refined.pack(points), "refinement", objective_unit=unit, barrier=_BARRIER
-        )
-        if not solution.solved:
-            return RefinedSolution(solution.status, mesh, None, points.spring)
-        found = refined.unpack(solution.x)
-        return RefinedSolution(Status.SOLVED, mesh, trajectory_on(mesh, found), found.spring)
 
-
-def _even_mesh(phases: tuple[Phase, ...]) -> Mesh:
+def even_mesh(phases: tuple[Phase, ...]) -> Mesh:
     """Return a mesh of even intervals in each phase, in proportion to their lengths."""
     shares = np.diff([phase.start for phase in phases] + [1.0])
     counts = np.maximum(_FEWEST_INTERVALS, np.round(shares * _INITIAL_INTERVALS).astype(int))

@@ -1,0 +1,95 @@
+"""Solves for a new speed from refined gaits of neighbouring speeds, without the report's grid.
+
+The neighbours are interpolated on the finer one's mesh, which is close enough to the new optimum for a
+few iterations, and for the mesh to be fine enough at once.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.contact.schedule import single_impact
+from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.gait import Gait, RefinedGait
+from walk_optimizer.mesh_adaptation import resampled
+from walk_optimizer.model.parameters import KneeSpring
+from walk_optimizer.refinement import REMESHED, RefinedSolves, certified_refinement
+from walk_optimizer.request import GaitRequest
+from walk_optimizer.solve.session import SolveSession
+from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
+from walk_optimizer.transcription.phases import phases_of
+
+FloatArray = NDArray[np.float64]
+
+
+def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSession) -> RefinedGait | None:
+    """Return the certified gait of a new speed; None where the neighbours do not lead to one.
+
+    Args:
+        request: Speed, step and spring mode.
+        neighbours: Refined gaits of the same walker in single support: one, or two with speeds on
+            either side.
+        session: Clock, cancelling and progress.
+
+    Raises:
+        InvalidRequestError: there are not one or two neighbours, or they are not refined, or use
+            other contacts than single support.
+    """
+    if not 1 <= len(neighbours) <= 2:
+        raise InvalidRequestError(f"{len(neighbours)} neighbours given, expected one or two")
+    meshes = [_mesh_of(gait) for gait in neighbours]
+    mesh = max(meshes, key=lambda one: one.intervals)
+    guesses = [_on_mesh(gait, old, mesh) for gait, old in zip(neighbours, meshes, strict=True)]
+    guess = _between(guesses[0], guesses[-1], _share(request, neighbours))
+    walker = neighbours[0].walker
+    solves = RefinedSolves(request, walker, session)
+    solution = solves.adapted(solves.solved(mesh, guess, REMESHED))
+    return certified_refinement(walker, request, solution)
+
+
+def _mesh_of(gait: Gait) -> Mesh:
+    """Return the mesh of a gait in single support.
+
+    Raises:
+        InvalidRequestError: it is not refined, or has other contacts.
+    """
+    if gait.refined is None:
+        raise InvalidRequestError(f"the gait at {gait.speed:.4f} m/s is not refined; solve it again")
+    trajectory = gait.refined.trajectory
+    if trajectory.impulses[1:].any() or trajectory.forces[:, :, 2:].any():
+        raise InvalidRequestError(f"the gait at {gait.speed:.4f} m/s is not one of single support")
+    return Mesh(
+        phases_of(single_impact(gait.trajectory.points)), (trajectory.lengths / trajectory.step_time,)
+    )
+
+
+def _on_mesh(gait: Gait, old: Mesh, mesh: Mesh) -> RefinedPoints:
+    """Return a gait's values at the same parts of its step as the nodes of a mesh."""
+    if gait.refined is None:
+        raise InvalidRequestError(f"the gait at {gait.speed:.4f} m/s is not refined; solve it again")
+    return resampled(gait.refined.trajectory, gait.refined.spring, old, mesh)
+
+
+def _share(request: GaitRequest, neighbours: Sequence[Gait]) -> float:
+    """Return where the new speed lies between two: 0 at the first, 1 at the second."""
+    first, last = neighbours[0].request.speed, neighbours[-1].request.speed
+    return 0.0 if first == last else float(np.clip((request.speed - first) / (last - first), 0.0, 1.0))
+
+
+def _between(first: RefinedPoints, second: RefinedPoints, share: float) -> RefinedPoints:
+    """Interpolate linearly between the values of two gaits on one mesh."""
+
+    def mixed(one: FloatArray, other: FloatArray) -> FloatArray:
+        return (1 - share) * one + share * other
+
+    springs = [np.array([one.spring.stiffness, one.spring.equilibrium]) for one in (first, second)]
+    stiffness, equilibrium = mixed(*springs)
+    return RefinedPoints(
+        states=mixed(first.states, second.states),
+        torques=mixed(first.torques, second.torques),
+        forces=mixed(first.forces, second.forces),
+        durations=mixed(first.durations, second.durations),
+        impulses=mixed(first.impulses, second.impulses),
+        spring=KneeSpring(float(stiffness), float(equilibrium)),
+    )
