@@ -20,6 +20,7 @@ from walk_optimizer.optimizer import optimize
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.resolve import resolve
 from walk_optimizer.search import Search
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
@@ -208,10 +209,11 @@ def ours_resolve(request: GaitRequest, neighbour: Gait) -> Score:
 
 def resolved(request: GaitRequest, neighbour: Gait) -> RefinedGait:
     """Return the refined gait that continues a neighbour: the one place that knows how it is asked for."""
-    outcome = optimize(request, neighbour.walker, seeds=(neighbour,), from_scratch=False)
-    if outcome.gait is None or outcome.gait.refined is None:
-        raise RuntimeError(outcome.report.message)
-    return outcome.gait.refined
+    settings = solver_settings()
+    gait = resolve(request, [neighbour], SolveSession(settings, settings.time_limit, None))
+    if gait is None:
+        raise RuntimeError("the neighbour leads to no certified gait")
+    return gait
 
 
 def plain_resolve(request: GaitRequest, neighbour: Gait) -> Score:
