@@ -126,9 +126,10 @@ class GaitLibraryNode(ManagedNode):
                 throttle_duration_sec=1.0,
             )
             try:
-                return await self._solve(wanted), OPTIMIZER, f"solved now; {error}"
+                gait = await self._solve(wanted)
             except ServiceUnavailableError as away:
                 raise ServiceUnavailableError(f"{error}; {away}") from away
+            return gait, OPTIMIZER, "solved now" if selection is Selection.EXACT else f"solved now; {error}"
         blended = source is Source.INTERPOLATED
         return gait, source.value, gait.report.message if blended else f"from the {source.value}"
 
