@@ -1,16 +1,22 @@
-"""The ground that a walker walks on: level, inclined, or stairs."""
+"""The ground that a walker walks on: level, inclined, or stairs.
+
+NumPy is loaded where it is needed: the command line reads walkers before anything is computed.
+"""
+
+from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.resources import text_hint
 
-FloatArray = NDArray[np.float64]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    FloatArray = NDArray[np.float64]
 
 STEEPEST_SLOPE = math.pi / 4
 
@@ -40,7 +46,7 @@ class Terrain:
             raise ConfigurationError(f"terrain slope is {self.slope} rad, allowed is -pi/4 to pi/4")
 
     @classmethod
-    def from_entries(cls, entries: Any) -> "Terrain":
+    def from_entries(cls, entries: Any) -> Terrain:
         """Return the terrain of a mapping with `slope` and `step_up`, either of which may be left out.
 
         Raises:
@@ -63,6 +69,8 @@ class Terrain:
 
     def height(self, x: FloatArray | float, tread: float) -> FloatArray:
         """Return the height of the ground in [m] at places x in [m], treads being `tread` in [m] long."""
+        import numpy as np
+
         part = np.asarray(x) / tread
         stairs = self.step_up * (part - np.sin(2 * np.pi * part) / (2 * np.pi))
         height: FloatArray = math.tan(self.slope) * np.asarray(x) + stairs
@@ -75,6 +83,8 @@ class Terrain:
 
     def along_and_normal(self, vectors: FloatArray) -> FloatArray:
         """Return the components of vectors (2, ...) along the surface, uphill positive, and normal to it."""
+        import numpy as np
+
         cosine, sine = math.cos(self.slope), math.sin(self.slope)
         return np.array([cosine * vectors[0] + sine * vectors[1], cosine * vectors[1] - sine * vectors[0]])
 
