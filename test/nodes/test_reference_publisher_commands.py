@@ -204,3 +204,13 @@ def test_peers_whose_quality_of_service_does_not_fit_are_named_with_both_policie
         "target_speed is not heard from /test_client: reliability offered best_effort, requested reliable",
     ):
         graph.spin_until(lambda text=text: text in publisher.output(), text)
+
+
+def test_a_stop_works_whatever_was_blended_before(graph, walker, joints, publisher):
+    """A gait that is not refined has no certified steps, but was begun while none were asked for."""
+    walker.walk(SLOW)
+    assert graph.set_parameters(NODE, Parameter("transitions", value="certified"))[0].successful
+    walker.trigger("stop")
+    walker.wait_for("standing")
+    assert "are known: blends, to stop at once" in publisher.output()
+    assert graph.set_parameters(NODE, Parameter("transitions", value="blended"))[0].successful

@@ -1,12 +1,16 @@
 """Plans the steps between paces in a process of its own: they may take long, and the stream never waits."""
 
+import contextlib
 from collections import OrderedDict
 from pathlib import Path
 from typing import TypeAlias
 
+import numpy as np
+
 from walk_optimizer.blending import blended
 from walk_optimizer.errors import InvalidRequestError, SolveFailedError, WalkOptimizerError
 from walk_optimizer.gait import RefinedGait
+from walk_optimizer.model.parameters import KneeSpring
 from walk_optimizer.nodes.publisher_settings import BLENDED
 from walk_optimizer.nodes.streamed_gait import Goal, pace_of_goal, profile_of_goal
 from walk_optimizer.nodes.suite_node import SuiteNode
@@ -22,8 +26,8 @@ from walk_optimizer.walk import StepPlan
 # Transitions that are kept in memory; they take about 100 kB each.
 _KEPT = 64
 _WORKERS = 1
-# Names and states of both ends, and the torque limit.
-_Key: TypeAlias = tuple[object, ...]
+# Names, knee springs and states of both ends.
+_Ends: TypeAlias = tuple[tuple[str, KneeSpring, bytes], ...]
 
 
 class NoTransitionError(WalkOptimizerError):
@@ -43,7 +47,7 @@ class TransitionPlanner:
             node: Whose parameters count, and whose executor waits.
         """
         self._node = node
-        self._known: OrderedDict[_Key, tuple[RefinedGait, ...]] = OrderedDict()
+        self._known: OrderedDict[_Ends, tuple[RefinedGait, ...]] = OrderedDict()
         self._pool: WorkerPool | None = None
         self._ticket: Ticket | None = None
 
@@ -80,14 +84,17 @@ class TransitionPlanner:
             ) from error
         return _plan(begins, leads_to, steps)
 
-    def plan_at_once(self, begins: Goal, leads_to: Goal, torque_limit: float) -> StepPlan:
+    def plan_at_once(self, begins: Goal, leads_to: Goal) -> StepPlan:
         """Return steps that are known already, or blended ones: for stops, which wait for nothing."""
-        try:
-            steps = self._known.get(_key(begins, leads_to, torque_limit), ())
-        except InvalidRequestError:
-            steps = ()
-        if steps:
-            return _plan(begins, leads_to, steps)
+        wanted = self._node.parameters["transitions"] != BLENDED
+        # A gait that is not refined may have been begun while blended steps were wanted.
+        with contextlib.suppress(InvalidRequestError):
+            steps = self._known.get(_ends(begins, leads_to))
+            if wanted and steps is not None:
+                return _plan(begins, leads_to, steps)
+        if wanted:
+            names = f"from {_name(begins)} to {_name(leads_to)}"
+            self._node.get_logger().warning(f"no certified steps {names} are known: blends, to stop at once")
         return blended(profile_of_goal(begins), profile_of_goal(leads_to))
 
     async def _steps(self, begins: Goal, leads_to: Goal, torque_limit: float) -> tuple[RefinedGait, ...]:
@@ -98,13 +105,14 @@ class TransitionPlanner:
             SolveFailedError: none were found.
             BusyError: the process is ending.
         """
-        key = _key(begins, leads_to, torque_limit)
-        if key not in self._known:
-            self._known[key] = await self._solve(begins, leads_to, torque_limit)
-        self._known.move_to_end(key)
+        ends = _ends(begins, leads_to)
+        steps = self._known.get(ends)
+        if steps is None or _peak_torque(steps) > torque_limit:
+            steps = self._known[ends] = await self._solve(begins, leads_to, torque_limit)
+        self._known.move_to_end(ends)
         while len(self._known) > _KEPT:
             self._known.popitem(last=False)
-        return self._known[key]
+        return steps
 
     async def _solve(self, begins: Goal, leads_to: Goal, torque_limit: float) -> tuple[RefinedGait, ...]:
         source, target = _paces(begins, leads_to)
@@ -129,10 +137,20 @@ class TransitionPlanner:
         return tuple(answer.steps)
 
 
-def _key(begins: Goal, leads_to: Goal, torque_limit: float) -> _Key:
-    source, target = _paces(begins, leads_to)
-    ends = [(pace_name(pace), border_state(pace).tobytes()) for pace in (source, target)]
-    return (*ends, torque_limit)
+def _ends(begins: Goal, leads_to: Goal) -> _Ends:
+    """Return what tells one pair of paces from another.
+
+    Raises:
+        InvalidRequestError: a gait is not refined, so it has no end that steps could lead to.
+    """
+    return tuple(
+        (pace_name(pace), spring_of(pace), border_state(pace).tobytes()) for pace in _paces(begins, leads_to)
+    )
+
+
+def _peak_torque(steps: tuple[RefinedGait, ...]) -> float:
+    """Return the largest torque of steps in [N m]."""
+    return max(float(np.abs(step.trajectory.torques).max()) for step in steps)
 
 
 def _paces(begins: Goal, leads_to: Goal) -> tuple[Pace, Pace]:

@@ -108,7 +108,7 @@ class WalkCommands:
         pace = self._stream.pace
         while isinstance(pace, StreamedGait):
             stand = self._stand_after(pace)
-            plan = self._planner.plan_at_once(pace, stand, self._torque_limit)
+            plan = self._planner.plan_at_once(pace, stand)
             if self._stream.follow(plan, stand):
                 self._peaks = peaks_of([stand])
                 return "comes to a stand after the running step"
