@@ -1,7 +1,7 @@
 """Solves for a new speed from refined gaits of neighbouring speeds, without the report's grid.
 
 The neighbours are interpolated on the finer one's mesh, which is close enough to the new optimum for a
-few iterations, and for the mesh to be fine enough at once.
+few iterations, and for the mesh to be fine enough: it is divided only if the certificate fails.
 """
 
 from collections.abc import Sequence
@@ -44,8 +44,9 @@ def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSess
     guess = _between(guesses[0], guesses[-1], _share(request, neighbours))
     walker = neighbours[0].walker
     solves = RefinedSolves(request, walker, session)
-    solution = solves.adapted(solves.solved(mesh, guess, REMESHED))
-    return certified_refinement(walker, request, solution)
+    solution = solves.solved(mesh, guess, REMESHED)
+    gait = certified_refinement(walker, request, solution)
+    return gait or certified_refinement(walker, request, solves.adapted(solution))
 
 
 def _mesh_of(gait: Gait) -> Mesh:
