@@ -34,8 +34,8 @@ from walk_optimizer.phase_clock import Motion
 from walk_optimizer.references import sample_cycle
 from walk_optimizer.request import GaitRequest
 
-# The executor may hold Python's lock for that long in [s]; the usual 5 ms are several ticks.
-_SWITCH_INTERVAL = 0.0005
+# The executor may hold Python's lock for that long in [s], several times a tick; the usual is 5 ms.
+_SWITCH_INTERVAL = 0.0001
 
 
 class ReferencePublisherNode(ManagedNode):

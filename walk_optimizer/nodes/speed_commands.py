@@ -4,6 +4,7 @@ import time
 from dataclasses import dataclass
 
 from geometry_msgs.msg import Twist
+from rclpy.timer import Timer
 from std_msgs.msg import Float64
 
 from walk_optimizer.command_watch import CommandWatch
@@ -53,6 +54,7 @@ class SpeedCommands:
         self._current: _Target | None = None
         self._refused: tuple[_Target, float] | None = None
         self._following = False
+        self._timer: Timer | None = None
         for kind, topic, callback in (
             (Float64, "~/target_speed", self._on_target_speed),
             (Twist, "~/cmd_vel", self._on_twist),
@@ -61,23 +63,25 @@ class SpeedCommands:
             node.create_subscription(
                 kind, topic, callback, COMMAND, callback_group=node.group, event_callbacks=events
             )
-        node.repeat(_WATCH_PERIOD, self._look)
 
     def forget(self) -> None:
         """Drop what was asked for: another command has come than by these topics."""
         self._waiting = self._current = None
-        self.watch.end()
+        self._watch_no_more()
 
     def _on_target_speed(self, message: Float64) -> None:
         target = self._target(message.data)
         if target is not None:
-            self.watch.end()
+            self._watch_no_more()
             self._take(target)
 
     def _on_twist(self, message: Twist) -> None:
         target = self._target(message.linear.x)
         if target is not None:
             self.watch.heard(self._now())
+            # Only now: each time that the executor wakes costs the stream a tick at 1 kHz.
+            if self._timer is None:
+                self._timer = self._node.repeat(_WATCH_PERIOD, self._look)
             self._take(target)
 
     def _target(self, speed: float) -> _Target | None:
@@ -136,6 +140,12 @@ class SpeedCommands:
 
     def _tell_refusal(self, error: WalkOptimizerError) -> None:
         self._node.get_logger().warning(f"target speed refused: {error}", throttle_duration_sec=1.0)
+
+    def _watch_no_more(self) -> None:
+        self.watch.end()
+        if self._timer is not None:
+            self._node.destroy_timer(self._timer)
+        self._timer = None
 
     def _look(self) -> None:
         """Stop the walk when a stream of speeds has fallen silent."""
