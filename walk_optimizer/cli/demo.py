@@ -40,7 +40,7 @@ _SOLVE_TIMEOUT = 900.0
 def add_parser(verbs: Subparsers) -> None:
     """Add the verb."""
     parser = add_verb(verbs, "demo", _TEXT, _EPILOG)
-    parser.add_argument("--speed", default="1.15km/h", metavar="SPEED", help="default: %(default)s")
+    parser.add_argument("--speed", default="0.3185", metavar="SPEED", help="default: %(default)s")
     parser.add_argument(
         "--spring",
         default=SpringMode.STIFFNESS_AND_EQUILIBRIUM.value,
