@@ -9,7 +9,6 @@ from functools import cache
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from walk_optimizer.contact.schedule import FootMode
 from walk_optimizer.mechanics import mechanics_at
@@ -72,6 +71,9 @@ def replay_interval(
     walker: WalkerParameters, spring: KneeSpring, trajectory: RefinedTrajectory, index: int, state: FloatArray
 ) -> FloatArray:
     """Return the state (12,) at the end of an interval when its torques act on a state at its start."""
+    # Here, not above: loading SciPy takes longer than all the rest of the optimiser.
+    from scipy.integrate import solve_ivp
+
     rate = _rate_function(contact_modes(walker, spring, trajectory, index))
     parameters = ((spring.stiffness, spring.equilibrium), walker.vector(_ANY_TREAD))
     length = float(trajectory.lengths[index])
