@@ -107,6 +107,9 @@ def test_what_is_lacking_is_solved_once_and_stored(graph, start, stocked):
     assert len(table.gaits) == 3
     rebuilt = graph.call(Rebuild, "gait_library/rebuild", speeds=[0.4], spring_modes=["none"])
     assert (rebuilt.success, rebuilt.rebuilt) == (True, 1), rebuilt.message
+    refused = graph.call(Rebuild, "gait_library/rebuild", speeds=[0.4] * 64, spring_modes=["none"])
+    assert not refused.success
+    assert "64 speeds times 1 spring modes are too many to rebuild, allowed are 63" in refused.message
     assert_left_cleanly(library, library.stop(signal.SIGTERM))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from walk_optimizer_interfaces.msg import GaitTable
 from walk_optimizer_interfaces.srv import GetGait, ListGaits, OptimizeGait, Rebuild
 
-from walk_optimizer.errors import GaitNotFoundError, SolveFailedError, WalkOptimizerError
+from walk_optimizer.errors import GaitNotFoundError, InvalidRequestError, SolveFailedError, WalkOptimizerError
 from walk_optimizer.gait import Gait
 from walk_optimizer.library import EXACT_SPEED_TOLERANCE, GaitLibrary, Selection, Source, parse_selection
 from walk_optimizer.model.parameters import SpringMode
@@ -26,6 +26,8 @@ from walk_optimizer.request import GaitRequest, gait_table_settings
 OPTIMIZER = "optimizer"
 
 _TABLE = gait_table_settings()
+# Gaits that one request may have rebuilt: the table three times over.
+_MOST_REBUILT = 63
 
 SETTINGS = [
     WALKER_FILE,
@@ -175,6 +177,11 @@ class GaitLibraryNode(ManagedNode):
     async def _rebuild(self, request: Rebuild.Request, response: Rebuild.Response) -> None:
         speeds = list(request.speeds) or _TABLE.table_speeds()
         modes = request.spring_modes or [mode.value for mode in SpringMode]
+        if len(speeds) * len(modes) > _MOST_REBUILT:
+            raise InvalidRequestError(
+                f"{len(speeds)} speeds times {len(modes)} spring modes are too many to rebuild, allowed "
+                f"are {_MOST_REBUILT} gaits; ask for them in parts"
+            )
         wanted = [self._wanted(speed, mode) for mode in modes for speed in speeds]
         failures = [failure for one in wanted if (failure := await self._failure_of(one))]
         response.rebuilt = len(wanted) - len(failures)
