@@ -21,6 +21,7 @@ from other_solvers import OTHERS, available, solve_with
 from report import machine, table
 
 from walk_optimizer.certificate import certify
+from walk_optimizer.compiler import COMPILER_VARIABLE
 from walk_optimizer.contact.observation import slip_velocities
 from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.gait import Trajectory
@@ -34,7 +35,6 @@ from walk_optimizer.solve.solution import FloatArray, IterationState, Solution
 from walk_optimizer.solve.status import Status
 from walk_optimizer.starts import kinematic_starts
 from walk_optimizer.transcription import layout
-from walk_optimizer.transcription.compilation import COMPILER_VARIABLE
 from walk_optimizer.transcription.problems import (
     complementarity_problem,
     fixed_schedule_problem,

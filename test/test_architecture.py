@@ -14,7 +14,8 @@ ROOT = Path(walk_optimizer.__file__).parent
 # Each line is a layer: its modules may import each other and the layers above, nothing below.
 LAYERS = (
     ("errors", "__init__"),
-    ("resources",),
+    ("resources", "compiler"),
+    ("multifrontal",),
     ("model", "mechanics"),
     ("request",),
     ("contact",),

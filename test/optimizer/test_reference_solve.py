@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from walk_optimizer import reference_solve
+from walk_optimizer.compiler import COMPILER_VARIABLE
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
@@ -13,7 +14,6 @@ from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.solution import Solution
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription import reference_formulation
-from walk_optimizer.transcription.compilation import COMPILER_VARIABLE
 from walk_optimizer.transcription.problems import to_scaled
 from walk_optimizer.transcription.reference_formulation import (
     LEAST_MAXIMUM,

@@ -7,8 +7,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from walk_optimizer.compiler import COMPILER_VARIABLE, cache_folder
 from walk_optimizer.transcription.boundary import periodic_functions
-from walk_optimizer.transcription.compilation import COMPILER_VARIABLE, cache_folder, compiled
+from walk_optimizer.transcription.compilation import compiled
 from walk_optimizer.transcription.euler_stage import euler_functions
 
 COMPILER = shutil.which("cc")

@@ -1,30 +1,22 @@
 """Compiles CasADi functions to machine code once, and keeps the result for the next process."""
 
-import hashlib
 import logging
 import os
-import platform
-import shutil
 import subprocess
-import tempfile
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 
 import casadi as ca
 
+from walk_optimizer.compiler import compile_library, find_compiler, library_path
+
 _LOGGER = logging.getLogger(__name__)
 # -O2 takes half as long again to compile and runs no faster on this straight-line code.
-_COMPILER_FLAGS = ("-O1", "-fPIC", "-shared")
-COMPILER_VARIABLE = "WALK_OPTIMIZER_CC"
+_FLAGS = ("-O1",)
+_INTERPRETER = "CasADi's slower interpreter"
 # Functions whose names end so are only asked for their sparsity, and need no machine code.
 PATTERN = "_pattern"
-
-
-def cache_folder() -> Path:
-    """Return the folder of compiled code: `$XDG_CACHE_HOME/walk_optimizer`, by default below `~/.cache`."""
-    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(root) / "walk_optimizer"
 
 
 @cache
@@ -36,27 +28,14 @@ def compiled(build: Callable[[], list[ca.Function]]) -> dict[str, ca.Function]:
     """
     functions = {function.name(): function for function in build()}
     evaluated = {name: function for name, function in functions.items() if not name.endswith(PATTERN)}
-    compiler = _compiler()
+    compiler = find_compiler(_INTERPRETER)
     if compiler is None:
         return functions
     try:
         return functions | _machine_code(evaluated, compiler)
     except (OSError, RuntimeError, subprocess.CalledProcessError) as error:
-        _LOGGER.warning("C code can't be compiled (%s); CasADi's slower interpreter is used", error)
+        _LOGGER.warning("C code can't be compiled (%s); %s is used", error, _INTERPRETER)
         return functions
-
-
-def _compiler() -> str | None:
-    """Return the path of the C compiler; None without one, with a warning if one was named."""
-    named = os.environ.get(COMPILER_VARIABLE)
-    if named == "":
-        return None
-    compiler = shutil.which(named or "cc")
-    if named and compiler is None:
-        _LOGGER.warning(
-            "%s is %r, which is no program; CasADi's slower interpreter is used", COMPILER_VARIABLE, named
-        )
-    return compiler
 
 
 def _machine_code(functions: dict[str, ca.Function], compiler: str) -> dict[str, ca.Function]:
@@ -67,16 +46,16 @@ def _machine_code(functions: dict[str, ca.Function], compiler: str) -> dict[str,
         RuntimeError: what was compiled can't be loaded.
         CalledProcessError: the compiler failed.
     """
-    library = _library_path(functions, compiler)
+    contents = [ca.__version__, *(function.serialize() for function in functions.values())]
+    name, parts = next(iter(functions)), (part.encode() for part in contents)
+    library = library_path(name, compiler, _FLAGS, parts)
     if library.is_file():
         try:
             return _loaded(functions, library)
         except RuntimeError:
             _LOGGER.warning("%s is damaged and is compiled again", library)
             library.unlink(missing_ok=True)
-    library.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-        _compile(functions, compiler, Path(folder), library)
+    compile_library(library, compiler, _FLAGS, lambda folder: [_generated(functions, folder)])
     return _loaded(functions, library)
 
 
@@ -84,21 +63,10 @@ def _loaded(functions: Iterable[str], library: Path) -> dict[str, ca.Function]:
     return {name: ca.external(name, str(library)) for name in functions}
 
 
-def _library_path(functions: dict[str, ca.Function], compiler: str) -> Path:
-    """Return the path in the cache that stands for these functions and this compiler."""
-    key = hashlib.sha256(" ".join([ca.__version__, platform.machine(), compiler, *_COMPILER_FLAGS]).encode())
-    for function in functions.values():
-        key.update(function.serialize().encode())
-    return cache_folder() / f"{next(iter(functions))}-{key.hexdigest()[:24]}.so"
-
-
-def _compile(functions: dict[str, ca.Function], compiler: str, folder: Path, library: Path) -> None:
-    """Generate C into a scratch folder, compile it, and move the result to its place in one step."""
+def _generated(functions: dict[str, ca.Function], folder: Path) -> Path:
+    """Write the functions as C into a folder."""
     generator = ca.CodeGenerator("stage.c")
     for function in functions.values():
         generator.add(function)
     generator.generate(f"{folder}{os.sep}")
-    scratch = folder / "stage.so"
-    command = [compiler, *_COMPILER_FLAGS, str(folder / "stage.c"), "-o", str(scratch), "-lm"]
-    subprocess.run(command, check=True, capture_output=True)
-    scratch.replace(library)
+    return folder / "stage.c"
