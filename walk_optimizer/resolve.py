@@ -38,9 +38,12 @@ def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSess
     """
     if not 1 <= len(neighbours) <= 2:
         raise InvalidRequestError(f"{len(neighbours)} neighbours given, expected one or two")
-    meshes = [_mesh_of(gait) for gait in neighbours]
+    refined = [_refined_of(gait) for gait in neighbours]
+    meshes = [_mesh_of(gait, one) for gait, one in zip(neighbours, refined, strict=True)]
     mesh = max(meshes, key=lambda one: one.intervals)
-    guesses = [_on_mesh(gait, old, mesh) for gait, old in zip(neighbours, meshes, strict=True)]
+    guesses = [
+        resampled(one.trajectory, one.spring, old, mesh) for one, old in zip(refined, meshes, strict=True)
+    ]
     guess = _between(guesses[0], guesses[-1], _share(request, neighbours))
     walker = neighbours[0].walker
     solves = RefinedSolves(request, walker, session)
@@ -49,27 +52,29 @@ def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSess
     return gait or certified_refinement(walker, request, solves.adapted(solution))
 
 
-def _mesh_of(gait: Gait) -> Mesh:
-    """Return the mesh of a gait in single support.
+def _refined_of(gait: Gait) -> RefinedGait:
+    """Return the accurate solution of a gait.
 
     Raises:
-        InvalidRequestError: it is not refined, or has other contacts.
+        InvalidRequestError: it has none.
     """
     if gait.refined is None:
         raise InvalidRequestError(f"the gait at {gait.speed:.4f} m/s is not refined; solve it again")
-    trajectory = gait.refined.trajectory
+    return gait.refined
+
+
+def _mesh_of(gait: Gait, refined: RefinedGait) -> Mesh:
+    """Return the mesh of a gait in single support.
+
+    Raises:
+        InvalidRequestError: it has other contacts.
+    """
+    trajectory = refined.trajectory
     if trajectory.impulses[1:].any() or trajectory.forces[:, :, 2:].any():
         raise InvalidRequestError(f"the gait at {gait.speed:.4f} m/s is not one of single support")
     return Mesh(
         phases_of(single_impact(gait.trajectory.points)), (trajectory.lengths / trajectory.step_time,)
     )
-
-
-def _on_mesh(gait: Gait, old: Mesh, mesh: Mesh) -> RefinedPoints:
-    """Return a gait's values at the same parts of its step as the nodes of a mesh."""
-    if gait.refined is None:
-        raise InvalidRequestError(f"the gait at {gait.speed:.4f} m/s is not refined; solve it again")
-    return resampled(gait.refined.trajectory, gait.refined.spring, old, mesh)
 
 
 def _share(request: GaitRequest, neighbours: Sequence[Gait]) -> float:
