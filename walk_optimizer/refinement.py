@@ -16,10 +16,10 @@ from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.status import Status
-from walk_optimizer.transcription.mesh import Mesh, RefinedPoints, without_vanished
+from walk_optimizer.transcription.mesh import Mesh, RefinedPoints, even_mesh, without_vanished
 from walk_optimizer.transcription.phases import (
     INSTANT_POINTS,
-    Phase,
+    phase_shares,
     phases_of,
     with_steady_end,
     without_brief_modes,
@@ -29,7 +29,6 @@ from walk_optimizer.transcription.scaling import torque_unit
 
 FloatArray = NDArray[np.float64]
 
-_INITIAL_INTERVALS = 24
 _FEWEST_INTERVALS = 3
 _MOST_PHASES = 6
 _ROUNDS = 6
@@ -114,7 +113,7 @@ def _begun(solves: "RefinedSolves", first: "FirstGuess", mesh: Mesh) -> RefinedS
     lasting = without_vanished(mesh, solution.trajectory.breaks)
     if lasting == mesh.phases:
         return solution
-    mesh = even_mesh(lasting)
+    mesh = even_mesh([lasting], _FEWEST_INTERVALS)
     return solves.solved(mesh, first.points(mesh), FROM_GRID)
 
 
@@ -190,7 +189,7 @@ class FirstGuess:
         steady = (with_steady_end(schedule), without_brief_modes(schedule))
         schedules = (schedule, *steady, single_impact(trajectory.points))
         plans = dict.fromkeys(phases_of(one) for one in schedules)
-        return [even_mesh(phases) for phases in plans if len(phases) <= _MOST_PHASES]
+        return [even_mesh([phases], _FEWEST_INTERVALS) for phases in plans if len(phases) <= _MOST_PHASES]
 
     def points(self, mesh: Mesh) -> RefinedPoints:
         """Interpolate the grid's states, torques and forces onto the mesh.
@@ -199,7 +198,7 @@ class FirstGuess:
         after them take their place.
         """
         trajectory = self.gait.trajectory
-        durations = np.diff([phase.start for phase in mesh.phases] + [1.0]) * self.request.step_time
+        durations = phase_shares(mesh.phases) * self.request.step_time
         nodes = mesh.node_times(durations)
         forces = horizontal_and_vertical(self.walker, trajectory.net_reaction())
         forces[:, :INSTANT_POINTS] = forces[:, INSTANT_POINTS : INSTANT_POINTS + 1]
@@ -215,10 +214,3 @@ class FirstGuess:
             impulses=np.zeros((len(mesh.phases), 4)),
             spring=self.gait.spring,
         )
-
-
-def even_mesh(phases: tuple[Phase, ...]) -> Mesh:
-    """Return a mesh of even intervals in each phase, in proportion to their lengths."""
-    shares = np.diff([phase.start for phase in phases] + [1.0])
-    counts = np.maximum(_FEWEST_INTERVALS, np.round(shares * _INITIAL_INTERVALS).astype(int))
-    return Mesh(phases, tuple(np.full(count, 1 / count) for count in counts))

@@ -1,18 +1,21 @@
 """The mesh of a refined step, and the values on it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.model.parameters import KneeSpring
-from walk_optimizer.transcription.phases import Phase
+from walk_optimizer.transcription.phases import Phase, phase_shares
 from walk_optimizer.transcription.tableau import NODES_WITH_START
 
 FloatArray = NDArray[np.float64]
 
 # No phase is shorter, in [s].
 SHORTEST_PHASE = 1e-3
+_INTERVALS_OF_STEP = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +87,18 @@ class Mesh:
     def lengths(self, durations: FloatArray) -> FloatArray:
         """Return the lengths of all intervals in [s], (n,), for durations of the phases in [s]."""
         return np.concatenate([part * time for part, time in zip(self.parts, durations, strict=True)])
+
+
+def even_mesh(steps: Sequence[tuple[Phase, ...]], fewest: int) -> Mesh:
+    """Return a mesh of even intervals in each phase of each step, in proportion to their lengths.
+
+    Args:
+        steps: Phases of each step.
+        fewest: Fewest intervals of a phase.
+    """
+    shares = np.concatenate([phase_shares(phases) for phases in steps]).tolist()
+    counts = [max(fewest, round(share * _INTERVALS_OF_STEP)) for share in shares]
+    return Mesh(tuple(chain.from_iterable(steps)), tuple(np.full(count, 1 / count) for count in counts))
 
 
 def without_vanished(mesh: Mesh, breaks: FloatArray) -> tuple[Phase, ...]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walk_optimizer.contact.schedule import FootMode, Schedule
 
@@ -37,6 +38,11 @@ class Phase:
     def begins_with_impact(self) -> bool:
         """Whether any foot takes an impulse as the phase begins."""
         return any(mode is not FootMode.FREE for mode in self.impact)
+
+
+def phase_shares(phases: tuple[Phase, ...]) -> NDArray[np.float64]:
+    """Return the lengths of a step's phases as parts of it; they add up to 1."""
+    return np.diff([phase.start for phase in phases] + [1.0])
 
 
 def phases_of(schedule: Schedule) -> tuple[Phase, ...]:

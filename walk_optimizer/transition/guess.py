@@ -7,7 +7,7 @@ from walk_optimizer.gait import Gait
 from walk_optimizer.model.kinematics import HIP_X
 from walk_optimizer.model.parameters import KneeSpring
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
-from walk_optimizer.transcription.phases import Phase
+from walk_optimizer.transcription.phases import phase_shares
 from walk_optimizer.transition.paces import EXCHANGED, Pace, border_state, former_step_sees, refined_of
 from walk_optimizer.transition.plan import ContactPlan
 from walk_optimizer.transition.standing import Standing
@@ -16,23 +16,10 @@ FloatArray = NDArray[np.float64]
 
 # A step that begins or ends on both feet takes about so much longer than one of its gait.
 _STANDING_SHARE = 1.5
-_INTERVALS_OF_STEP = 24
-_FEWEST_INTERVALS = 4
 # Torques and ground reactions with the names of the legs exchanged, behind a state of 12.
 _ALL_EXCHANGED = np.concatenate([EXCHANGED, 12 + np.array([0, 2, 1]), 15 + np.array([2, 3, 0, 1])])
 _ALL_SIGNS = np.where(np.arange(19) == 12, -1.0, 1.0)
 _STATE, _TORQUE, _FORCE = slice(0, 12), slice(12, 15), slice(15, 19)
-
-
-def even_mesh(plan: ContactPlan) -> Mesh:
-    """Return a mesh of even intervals in each phase, in proportion to their lengths."""
-    counts = [
-        max(_FEWEST_INTERVALS, round(share * _INTERVALS_OF_STEP))
-        for phases in plan.steps
-        for share in _shares(phases)
-    ]
-    phases = tuple(phase for step in plan.steps for phase in step)
-    return Mesh(phases, tuple(np.full(count, 1 / count) for count in counts))
 
 
 def faded_points(
@@ -48,7 +35,7 @@ def faded_points(
         spring: K and q_eq of both knees.
     """
     steps, time = len(plan.steps), _step_time(source, target)
-    durations = np.concatenate([_shares(phases) * time for phases in plan.steps])
+    durations = np.concatenate([phase_shares(phases) * time for phases in plan.steps])
     nodes = mesh.node_times(durations) / time
     step = np.minimum(nodes[:, 0].astype(int), steps - 1)
     values = np.array(
@@ -72,11 +59,6 @@ def faded_points(
         impulses=impulses,
         spring=spring,
     )
-
-
-def _shares(phases: tuple[Phase, ...]) -> FloatArray:
-    """Return the lengths of the phases as parts of their step."""
-    return np.diff([phase.start for phase in phases] + [1.0])
 
 
 def _step_time(source: Pace, target: Pace) -> float:

@@ -13,12 +13,12 @@ from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import SolverSettings, solver_settings
 from walk_optimizer.solve.status import FamilyViolation, ProgressCallback, SolveReport, Status
-from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
+from walk_optimizer.transcription.mesh import Mesh, RefinedPoints, even_mesh
 from walk_optimizer.transcription.scaling import torque_unit
 from walk_optimizer.transcription.transition import TransitionLimits, TransitionProblem
 from walk_optimizer.transition.certificate import certify_steps
 from walk_optimizer.transition.chain import end_in, steps_of
-from walk_optimizer.transition.guess import even_mesh, faded_points
+from walk_optimizer.transition.guess import faded_points
 from walk_optimizer.transition.paces import (
     Pace,
     border_state,
@@ -33,6 +33,7 @@ FloatArray = NDArray[np.float64]
 
 # Barrier parameters for a start from a faded guess, and from a coarser mesh.
 _FIRST_BARRIER, _NEXT_BARRIER = 1e-3, 1e-5
+_FEWEST_INTERVALS = 4
 _ROUNDS = 5
 # On level ground the length of treads plays no part.
 _ANY_TREAD = 1.0
@@ -138,7 +139,7 @@ class _Solve:
 
     def run(self) -> TransitionOutcome:
         """Return the transition on a mesh fine enough for its error and its certificate."""
-        mesh = even_mesh(self.plan)
+        mesh = even_mesh(self.plan.steps, _FEWEST_INTERVALS)
         points = faded_points(self.plan, mesh, self.request.source, self.request.target, self.spring)
         barrier, rounds = _FIRST_BARRIER, 0
         while True:
