@@ -22,19 +22,18 @@ from report import machine, table
 
 from walk_optimizer.certificate import certify
 from walk_optimizer.compiler import COMPILER_VARIABLE
-from walk_optimizer.contact.observation import slip_velocities
 from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.gait import Trajectory
 from walk_optimizer.guess import kinematic_guess
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.search import with_slip_speeds
 from walk_optimizer.solve.back_end import SolveOptions
 from walk_optimizer.solve.registry import BACK_ENDS, back_end
 from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.solution import FloatArray, IterationState, Solution
 from walk_optimizer.solve.status import Status
 from walk_optimizer.starts import kinematic_starts
-from walk_optimizer.transcription import layout
 from walk_optimizer.transcription.problems import (
     complementarity_problem,
     fixed_schedule_problem,
@@ -134,19 +133,12 @@ def _posed(request: GaitRequest, walker: WalkerParameters, kind: str) -> tuple[P
         return relaxed, start
     optimum = back_end("ipopt").solve(schedule, start, SolveOptions())
     points, spring = from_scaled(walker, optimum.x)
-    return relaxed, to_scaled(walker, _with_slip_speeds(walker, points), spring)
-
-
-def _with_slip_speeds(walker: WalkerParameters, points: FloatArray) -> FloatArray:
-    """Return the points with the least slip speeds that eqs. (5c) and (5d) allow."""
-    completed = points.copy()
-    completed[layout.SLIP] = np.abs(slip_velocities(walker, points[layout.Q], points[layout.P]))
-    return completed
+    return relaxed, to_scaled(walker, with_slip_speeds(walker, points), spring)
 
 
 def _judged(request: GaitRequest, walker: WalkerParameters, solution: Solution, seconds: float) -> Row:
     points, spring = from_scaled(walker, solution.x)
-    trajectory = Trajectory.from_stacked(_with_slip_speeds(walker, points), request.step_time)
+    trajectory = Trajectory.from_stacked(with_slip_speeds(walker, points), request.step_time)
     worst = certify(walker, request, spring, trajectory).worst
     says = solution.status.value
     objective = trajectory.torque_cost

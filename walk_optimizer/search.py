@@ -81,6 +81,13 @@ def distinct(candidates: Iterable[Candidate]) -> list[Candidate]:
     return kept
 
 
+def with_slip_speeds(walker: WalkerParameters, points: FloatArray) -> FloatArray:
+    """Return the points (23, N) with gamma = |slip|, the least that eqs. (5c) and (5d) allow."""
+    completed = points.copy()
+    completed[layout.SLIP] = np.abs(slip_velocities(walker, points[layout.Q], points[layout.P]))
+    return completed
+
+
 class Search:
     """The solves of one request, all within one session."""
 
@@ -160,11 +167,11 @@ class Search:
             if found is None or found.mean_effort >= best.mean_effort * (1 - SAME_OPTIMUM):
                 break
             best = found
-        return replace(best, points=self._with_slip_speeds(best.points))
+        return replace(best, points=with_slip_speeds(self.walker, best.points))
 
     def _with_other_contacts(self, best: Candidate, iterations: int) -> Candidate | None:
         """Return the optimum of the contacts that the relaxed problem moves to; None if it stays."""
-        start = replace(best, points=self._with_slip_speeds(best.points))
+        start = replace(best, points=with_slip_speeds(self.walker, best.points))
         problem = complementarity_problem(self.request, self.walker, self.relaxation)
         relaxed = self._solve(problem, start, "complementarity", barrier=_NEAR, maximum_iterations=iterations)
         schedule = self._schedule(relaxed)
@@ -186,7 +193,7 @@ class Search:
         request = replace(self.request, points=schedule.shape[1])
         problem = fixed_schedule_problem(request, self.walker, schedule)
         solved = self._solve(problem, guess, stage, barrier=barrier)
-        return replace(solved, points=self._with_slip_speeds(solved.points))
+        return replace(solved, points=with_slip_speeds(self.walker, solved.points))
 
     def _solve(
         self,
@@ -210,9 +217,3 @@ class Search:
         )
         points, spring = from_scaled(self.walker, solution.x)
         return replace(guess, points=points, spring=spring, status=solution.status, detail=solution.detail)
-
-    def _with_slip_speeds(self, points: FloatArray) -> FloatArray:
-        """Return the points with gamma = |slip|, the least that eqs. (5c) and (5d) allow."""
-        completed = points.copy()
-        completed[layout.SLIP] = np.abs(slip_velocities(self.walker, points[layout.Q], points[layout.P]))
-        return completed
