@@ -189,3 +189,28 @@ def test_parts_without_coupling_and_a_single_unknown():
         np.testing.assert_allclose(factorization.solve(right), right / matrix.diagonal())
         factorization.close()
         assert (verdict.flag, verdict.negative) == (0, 1)
+
+
+def test_a_solve_does_not_depend_on_those_before_it():
+    # Analyses are kept for the next solve of the same pattern, what was learnt from its matrices is not.
+    generator = np.random.default_rng(7)
+    matrix = chain(20, generator)
+    right = generator.standard_normal(matrix.shape[0])
+    solutions = []
+    for _ in range(2):
+        factorization = Factorization(LIBRARY, matrix)
+        factorization.factor(matrix)
+        solutions.append(factorization.solve(right))
+        factorization.factor(rescaled(matrix, 10.0 ** generator.uniform(-4, 4, matrix.shape[0])))
+        factorization.close()
+    np.testing.assert_array_equal(*solutions)
+
+
+def test_patterns_that_are_used_in_turn_are_told_apart():
+    matrices = [chain(stages, np.random.default_rng(stages)) for stages in range(2, 9)] * 2
+    for matrix in matrices:
+        factorization = Factorization(LIBRARY, matrix)
+        factorization.factor(matrix)
+        right = np.ones(matrix.shape[0])
+        check(matrix, right, factorization.solve(right))
+        factorization.close()

@@ -8,6 +8,7 @@
  * is left of a front, its contribution, waits on a stack for its parent. */
 #include "factorization.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +19,7 @@
 #define GOOD_PIVOT 0.01
 
 /* Sweeps of the scaling, each of which begins with the scales of the matrix before. */
-#define SCALING_SWEEPS 2
+#define SCALING_SWEEPS 1
 
 struct Analysis {
     AssemblyTree *tree;
@@ -147,7 +148,13 @@ Analysis *analyse(int n, const int *begin, const int *index) {
     return NULL;
 }
 
-static Factors *new_factors(const AssemblyTree *tree) {
+void forget(const Analysis *analysis, Factors *factors) {
+    memcpy(factors->pivots, analysis->tree->pivots, (size_t)analysis->tree->n * sizeof(int));
+    for (int i = 0; i < analysis->tree->n; i++) factors->scale[i] = 1.0;
+}
+
+static Factors *new_factors(const Analysis *analysis) {
+    const AssemblyTree *tree = analysis->tree;
     Factors *factors = calloc(1, sizeof *factors);
     if (factors == NULL) return NULL;
     factors->fronts = malloc(((size_t)tree->front_count + 1) * sizeof(Front));
@@ -160,8 +167,7 @@ static Factors *new_factors(const AssemblyTree *tree) {
     if (factors->fronts != NULL && factors->pivots != NULL && factors->place != NULL &&
         factors->places != NULL && factors->part != NULL && factors->scale != NULL &&
         factors->largest != NULL) {
-        memcpy(factors->pivots, tree->pivots, (size_t)tree->n * sizeof(int));
-        for (int i = 0; i < tree->n; i++) factors->scale[i] = 1.0;
+        forget(analysis, factors);
         return factors;
     }
     free_factors(factors);
@@ -248,8 +254,8 @@ static int assemble(const Analysis *analysis, const double *values, int f, Facto
         for (int c = 0; c < rest; c++, from += rest) {
             size_t j = to[c];
             for (int r = c; r < rest; r++) {
-                size_t i = to[r];
-                a[i > j ? i + j * size : j + i * size] += from[r];
+                size_t i = to[r], low = i < j ? i : j, high = i < j ? j : i;
+                a[high + low * size] += from[r];
             }
         }
         factors->stack.used = child->contribution;
@@ -277,46 +283,64 @@ typedef struct {
     double quality;
 } Pivot;
 
-/* Largest entries off the diagonal in column t of what is left: of all rows but `except`, and where the
- * largest of the candidates is. */
-static double column_maximum(const double *a, size_t size, int from, int candidates, int t, int except,
-                             int *where) {
-    double border = 0.0, inside = 0.0;
-    const double *column = a + t * size;
-    *where = -1;
+/* Largest magnitude of n numbers. */
+static double largest_of(const double *values, size_t n) {
+    double largest = 0.0;
+#pragma omp simd reduction(max : largest)
+    for (size_t i = 0; i < n; i++) largest = fabs(values[i]) > largest ? fabs(values[i]) : largest;
+    return largest;
+}
+
+/* Largest magnitude off the diagonal in column t of what is left, from row `from` on. */
+static double column_maximum(const double *a, size_t size, int from, int t) {
+    double largest = largest_of(a + (t + 1) + t * size, size - t - 1);
     for (int i = from; i < t; i++) {
         double value = fabs(a[t + i * size]);
-        if (i != except && value > inside) inside = value, *where = i;
+        largest = value > largest ? value : largest;
     }
-    for (int i = t + 1; i < candidates; i++) {
-        double value = fabs(column[i]);
-        if (i != except && value > inside) inside = value, *where = i;
+    return largest;
+}
+
+/* The candidate that candidate t is most coupled to; -1 for none. */
+static int strongest_coupling(const double *a, size_t size, int from, int candidates, int t) {
+    double largest = 0.0;
+    int where = -1;
+    for (int i = from; i < candidates; i++) {
+        double value = i == t ? 0.0 : fabs(i < t ? a[t + i * size] : a[i + t * size]);
+        if (value > largest) largest = value, where = i;
     }
-#pragma omp simd reduction(max : border)
-    for (size_t i = candidates; i < size; i++) border = fabs(column[i]) > border ? fabs(column[i]) : border;
-    return border > inside ? border : inside;
+    return where;
+}
+
+/* Largest magnitude in column t of what is left, without rows t and other. */
+static double remaining_maximum(double *a, size_t size, int from, int t, int other) {
+    double *coupling = t < other ? a + other + t * size : a + t + other * size, kept = *coupling;
+    *coupling = 0.0;
+    double largest = column_maximum(a, size, from, t);
+    *coupling = kept;
+    return largest;
 }
 
 /* Judge column t as a pivot, alone or with the candidate that it is most coupled to. */
-static Pivot judge(const double *a, size_t size, int from, int candidates, int t, double smallest) {
-    int other, ignored;
-    double diagonal = a[t + t * size];
-    double largest = column_maximum(a, size, from, candidates, t, -1, &other);
+static Pivot judge(double *a, size_t size, int from, int candidates, int t, double smallest) {
+    double diagonal = a[t + t * size], largest = column_maximum(a, size, from, t);
     Pivot single = {t, -1, 0.0};
     if (fabs(diagonal) > smallest) single.quality = fabs(diagonal) >= largest ? 1.0 : fabs(diagonal) / largest;
-    if (single.quality >= GOOD_PIVOT || other < 0 || largest <= smallest) return single;
+    if (single.quality >= GOOD_PIVOT || largest <= smallest) return single;
+    int other = strongest_coupling(a, size, from, candidates, t);
+    if (other < 0) return single;
     int low = t < other ? t : other, high = t < other ? other : t;
     double a11 = a[low + low * size], a21 = a[high + low * size], a22 = a[high + high * size];
     double scale = fabs(a21), determinant = (a11 / scale) * (a22 / scale) - 1.0; /* over a21^2 */
-    double first = column_maximum(a, size, from, candidates, low, high, &ignored);
-    double second = column_maximum(a, size, from, candidates, high, low, &ignored);
+    double first = remaining_maximum(a, size, from, low, high);
+    double second = remaining_maximum(a, size, from, high, low);
     double growth = fmax(fabs(a22) * first + scale * second, scale * first + fabs(a11) * second);
     double quality = growth > 0.0 ? fabs(determinant) * scale * scale / growth : 1.0;
     if (quality > 1.0) quality = 1.0;
     return fabs(determinant) > 1e-12 && quality > single.quality ? (Pivot){low, high, quality} : single;
 }
 
-static Pivot choose_pivot(const double *a, size_t size, int from, int candidates, double threshold,
+static Pivot choose_pivot(double *a, size_t size, int from, int candidates, double threshold,
                           double smallest) {
     double enough = threshold > GOOD_PIVOT ? threshold : GOOD_PIVOT;
     Pivot best = {from, -1, -1.0};
@@ -457,10 +481,12 @@ static void remember_order(const Analysis *analysis, Factors *factors, int f, in
 int factor(const Analysis *analysis, const double *values, double threshold, double smallest,
            Factors **made, Inertia *inertia) {
     const AssemblyTree *tree = analysis->tree;
-    Factors *factors = *made != NULL ? *made : (*made = new_factors(tree));
+    Factors *factors = *made != NULL ? *made : (*made = new_factors(analysis));
     if (factors == NULL) return 0;
     factors->values.used = factors->stack.used = factors->indices.used = factors->waiting.used = 0;
     *inertia = (Inertia){0};
+    /* Of scaled entries, which are at most about 1, what is smaller than this is rounding. */
+    smallest = fmax(smallest, DBL_EPSILON);
     equilibrate(analysis, values, factors);
     for (int f = 0; f < tree->front_count; f++) {
         int candidates = list_unknowns(tree, f, factors);

@@ -33,6 +33,9 @@ int factor(const Analysis *analysis, const double *values, double threshold, dou
            Factors **factors, Inertia *inertia);
 void free_factors(Factors *factors);
 
+/* Forget the scales and the order of pivots that earlier matrices have left behind. */
+void forget(const Analysis *analysis, Factors *factors);
+
 /* Solve in place for one right-hand side x[n]. */
 void solve(const Analysis *analysis, Factors *factors, double *x);
 

@@ -3,7 +3,7 @@
  * IPOPT knows several of them by name. We answer those that it makes to ma97, whose declarations it
  * publishes (src/Algorithm/LinearSolvers/IpMa97SolverInterface.hpp and hsl_ma97d.h). Matrices come as
  * columns of the lower triangle with indices from 1. */
-#include <limits.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -37,12 +37,76 @@ struct ma97_info {
 
 enum { OUT_OF_MEMORY = -1, SINGULAR = -7 };
 
-/* What IPOPT keeps between its calls: one analysis, and the room of its factors. */
+/* What IPOPT keeps between its calls: one pattern and its analysis, and the room of its factors. */
 typedef struct {
     int n;
+    int *begin, *index; /* columns of the lower triangle, zero-based */
     Analysis *analysis;
     Factors *factors;
 } Handle;
+
+/* IPOPT analyses its matrix anew in every solve, but a search solves a few patterns many times. Those used
+ * last are kept, the newest first. */
+#define KEPT 4
+static Handle *kept[KEPT];
+static pthread_mutex_t kept_lock = PTHREAD_MUTEX_INITIALIZER;
+
+static void free_handle(Handle *handle) {
+    if (handle == NULL) return;
+    free_factors(handle->factors);
+    free_analysis(handle->analysis);
+    free(handle->begin), free(handle->index), free(handle);
+}
+
+static int same_pattern(const Handle *handle, int n, const int *ptr, const int *row) {
+    if (handle == NULL || handle->n != n) return 0;
+    for (int j = 0; j <= n; j++)
+        if (handle->begin[j] != ptr[j] - 1) return 0;
+    for (int k = 0; k < handle->begin[n]; k++)
+        if (handle->index[k] != row[k] - 1) return 0;
+    return 1;
+}
+
+/* Take the handle of a pattern out of those that are kept; NULL for none. */
+static Handle *take(int n, const int *ptr, const int *row) {
+    Handle *found = NULL;
+    pthread_mutex_lock(&kept_lock);
+    for (int k = 0; k < KEPT && found == NULL; k++) {
+        if (!same_pattern(kept[k], n, ptr, row)) continue;
+        found = kept[k];
+        memmove(kept + k, kept + k + 1, (KEPT - 1 - k) * sizeof *kept);
+        kept[KEPT - 1] = NULL;
+    }
+    pthread_mutex_unlock(&kept_lock);
+    /* The same solve must not depend on those before it. */
+    if (found != NULL && found->factors != NULL) forget(found->analysis, found->factors);
+    return found;
+}
+
+static void keep(Handle *handle) {
+    pthread_mutex_lock(&kept_lock);
+    Handle *oldest = kept[KEPT - 1];
+    memmove(kept + 1, kept, (KEPT - 1) * sizeof *kept);
+    kept[0] = handle;
+    pthread_mutex_unlock(&kept_lock);
+    free_handle(oldest);
+}
+
+static Handle *new_handle(int n, const int *ptr, const int *row) {
+    Handle *handle = calloc(1, sizeof *handle);
+    if (handle == NULL) return NULL;
+    handle->n = n;
+    handle->begin = malloc(((size_t)n + 1) * sizeof(int));
+    handle->index = malloc((size_t)ptr[n] * sizeof(int));
+    if (handle->begin != NULL && handle->index != NULL) {
+        for (int j = 0; j <= n; j++) handle->begin[j] = ptr[j] - 1;
+        for (int k = 0; k < ptr[n] - 1; k++) handle->index[k] = row[k] - 1;
+        handle->analysis = analyse(n, handle->begin, handle->index);
+    }
+    if (handle->analysis != NULL) return handle;
+    free_handle(handle);
+    return NULL;
+}
 
 EXPORTED void ma97_default_control_d(struct ma97_control *control) {
     memset(control, 0, sizeof *control);
@@ -55,22 +119,9 @@ EXPORTED void ma97_analyse_d(int check, int n, const int ptr[], const int row[],
                              const struct ma97_control *control, struct ma97_info *info, int order[]) {
     (void)check, (void)val, (void)control, (void)order;
     memset(info, 0, sizeof *info);
-    *akeep = NULL;
-    Handle *handle = calloc(1, sizeof *handle);
-    int *begin = malloc(((size_t)n + 1) * sizeof(int)), *index = malloc((size_t)ptr[n] * sizeof(int));
-    if (handle != NULL && begin != NULL && index != NULL) {
-        for (int j = 0; j <= n; j++) begin[j] = ptr[j] - 1;
-        for (int k = 0; k < begin[n]; k++) index[k] = row[k] - 1;
-        handle->n = n;
-        handle->analysis = analyse(n, begin, index);
-    }
-    free(begin), free(index);
-    if (handle == NULL || handle->analysis == NULL) {
-        free(handle);
-        info->flag = OUT_OF_MEMORY;
-        return;
-    }
-    *akeep = handle;
+    Handle *handle = take(n, ptr, row);
+    *akeep = handle != NULL ? handle : new_handle(n, ptr, row);
+    if (*akeep == NULL) info->flag = OUT_OF_MEMORY;
 }
 
 EXPORTED void ma97_factor_d(int matrix_type, const int ptr[], const int row[], const double val[],
@@ -114,11 +165,7 @@ EXPORTED void ma97_factor_solve_d(int matrix_type, const int ptr[], const int ro
 }
 
 EXPORTED void ma97_free_akeep_d(void **akeep) {
-    Handle *handle = *akeep;
-    if (handle == NULL) return;
-    free_factors(handle->factors);
-    free_analysis(handle->analysis);
-    free(handle);
+    if (*akeep != NULL) keep(*akeep);
     *akeep = NULL;
 }
 

@@ -385,7 +385,7 @@ static int add_dense_front(Fronts *fronts, const Graph *g, const int *begin, con
 }
 
 /* Fronts smaller than this are merged into their parents: dense work is faster than bookkeeping. */
-#define SMALL_FRONT 4
+#define SMALL_FRONT 8
 
 /* Return for each front the one that it is merged into, itself where it stays; NULL without memory. */
 static int *amalgamate(Fronts *fronts) {
