@@ -11,6 +11,7 @@ from walk_optimizer.mechanics import foot_arm, mechanics_at
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.profile import RefinedProfile, join_error
+from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transition.builder import recomputed
 from walk_optimizer.transition.paces import refined_of
@@ -118,6 +119,13 @@ def test_a_cancel_is_obeyed(walker, gaits):
     outcome = plan_transition(walker, slow, faster, progress=lambda progress: progress.iteration < 3)
     assert outcome.transition is None
     assert outcome.report.status is Status.CANCELLED
+
+
+def test_the_report_names_the_solver_that_was_used(walker, gaits):
+    slow, faster = gaits[SpringMode.NONE][:2]
+    uno = replace(solver_settings(), back_end="uno")
+    outcome = plan_transition(walker, slow, faster, solver=uno, progress=lambda _: False)
+    assert outcome.report.back_end == "uno"
 
 
 def test_requests_that_make_no_sense_are_refused(walker, stand, gaits):

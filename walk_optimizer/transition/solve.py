@@ -74,7 +74,7 @@ def plan_transition(
     limit = solver.time_limit if time_limit is None else time_limit
     _check(walker, source, target, steps, torque_limit, limit, settings)
     session = SolveSession(solver, limit, progress)
-    request = _Request(walker, source, target, torque_limit, settings)
+    request = _Request(walker, source, target, torque_limit, settings, solver.back_end)
     numbers = (steps,) if steps else range(settings.steps, min(settings.steps + 1, settings.most_steps) + 1)
     for number in numbers:
         outcome = _Solve(request, number, session).run()
@@ -92,6 +92,7 @@ class _Request:
     target: Pace
     torque_limit: float
     settings: TransitionSettings
+    back_end: str
 
     @property
     def spring(self) -> KneeSpring:
@@ -203,7 +204,7 @@ class _Solve:
         return SolveReport(
             status,
             "; ".join(remarks),
-            "ipopt",
+            self.request.back_end,
             start=f"faded, {len(self.phases)} steps",
             starts=1,
             iterations=self.session.iterations,
