@@ -6,7 +6,6 @@ import re
 from dataclasses import dataclass
 from functools import cache
 from numbers import Real
-from pathlib import Path
 from typing import Any
 
 from walk_optimizer.errors import ConfigurationError, InvalidRequestError
@@ -64,15 +63,6 @@ class GaitTableSettings:
             if not low <= value <= high:
                 raise ConfigurationError(f"{name} is {value}, allowed is {low} to {high}")
 
-    @classmethod
-    def from_yaml(cls, path: Path | None = None) -> "GaitTableSettings":
-        """Read the settings, by default the packaged `config/gait_table.yaml`.
-
-        Raises:
-            ConfigurationError: an entry is missing, unknown or impossible.
-        """
-        return settings_from_yaml(cls, path or config_file("gait_table.yaml"))
-
     def table_steps(self) -> list[tuple[float, float]]:
         """Return (step length in [m], step time in [s]) of each gait of the table, slowest first."""
         return [self._step(index / (self.gaits - 1)) for index in range(self.gaits)]
@@ -100,7 +90,7 @@ class GaitTableSettings:
 @cache
 def gait_table_settings() -> GaitTableSettings:
     """Return the packaged gait table settings, read once."""
-    return GaitTableSettings.from_yaml()
+    return settings_from_yaml(GaitTableSettings, config_file("gait_table.yaml"))
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from walk_optimizer.errors import ConfigurationError, InvalidRequestError
 from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.request import GaitRequest, GaitTableSettings, gait_table_settings, parse_speed
+from walk_optimizer.resources import settings_from_yaml
 
 SETTINGS = gait_table_settings()
 
@@ -151,7 +152,7 @@ def test_wrong_tables_are_refused_with_the_name_of_the_file(tmp_path, changes, e
     path = tmp_path / "table.yaml"
     path.write_text(yaml.safe_dump(entries))
     with pytest.raises(ConfigurationError) as caught:
-        GaitTableSettings.from_yaml(path)
+        settings_from_yaml(GaitTableSettings, path)
     assert str(caught.value) == f"{path}: {expected}"
 
 
@@ -170,4 +171,4 @@ def test_tables_that_make_no_sense_are_refused(tmp_path, changes):
     path = tmp_path / "table.yaml"
     path.write_text(yaml.safe_dump(asdict(SETTINGS) | changes))
     with pytest.raises(ConfigurationError, match=next(iter(changes))):
-        GaitTableSettings.from_yaml(path)
+        settings_from_yaml(GaitTableSettings, path)

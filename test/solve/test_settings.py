@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from walk_optimizer.errors import ConfigurationError
+from walk_optimizer.resources import settings_from_yaml
 from walk_optimizer.solve.settings import SolverSettings, solver_settings, table_solver_settings
 
 NUMBERS = [name for name in asdict(solver_settings()) if name != "back_end"]
@@ -36,7 +37,9 @@ def test_the_table_is_searched_for_longer_than_a_single_request():
 
 def test_a_file_is_read_as_it_is_written(tmp_path):
     path = written(tmp_path, coarse_points=40, time_limit=12.5)
-    assert SolverSettings.from_yaml(path) == replace(solver_settings(), coarse_points=40, time_limit=12.5)
+    assert settings_from_yaml(SolverSettings, path) == replace(
+        solver_settings(), coarse_points=40, time_limit=12.5
+    )
 
 
 @pytest.mark.parametrize("name", NUMBERS)
@@ -66,7 +69,7 @@ def test_unknown_back_ends_are_refused_with_the_known_ones():
 def test_wrong_files_are_refused(tmp_path, changes, expected):
     path = written(tmp_path, **changes)
     with pytest.raises(ConfigurationError) as refusal:
-        SolverSettings.from_yaml(path)
+        settings_from_yaml(SolverSettings, path)
     assert str(refusal.value) == f"{path}: {expected}"
 
 
@@ -74,7 +77,7 @@ def test_a_number_that_yaml_takes_for_a_text_is_explained(tmp_path):
     path = written(tmp_path)
     path.write_text(path.read_text().replace("1.0e-09", "1e-9"))
     with pytest.raises(ConfigurationError, match=r"tolerance is '1e-9', .* write .* 1e-8 as 1\.0e-8"):
-        SolverSettings.from_yaml(path)
+        settings_from_yaml(SolverSettings, path)
 
 
 @pytest.mark.parametrize(

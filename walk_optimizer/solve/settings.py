@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.resources import config_file, require_positive, settings_from_yaml
@@ -44,23 +43,14 @@ class SolverSettings:
             raise ConfigurationError(f"unknown back_end {self.back_end!r}; known are {known}")
         require_positive(self, "solver setting ")
 
-    @classmethod
-    def from_yaml(cls, path: Path | None = None) -> "SolverSettings":
-        """Read settings, by default those of single requests, `config/solver.yaml`.
-
-        Raises:
-            ConfigurationError: an entry is missing, unknown or impossible.
-        """
-        return settings_from_yaml(cls, path or config_file("solver.yaml"))
-
 
 @cache
 def solver_settings() -> SolverSettings:
     """Return the packaged settings of single requests, read once."""
-    return SolverSettings.from_yaml()
+    return settings_from_yaml(SolverSettings, config_file("solver.yaml"))
 
 
 @cache
 def table_solver_settings() -> SolverSettings:
     """Return the packaged settings of the table's gaits (`config/table_solver.yaml`), read once."""
-    return SolverSettings.from_yaml(config_file("table_solver.yaml"))
+    return settings_from_yaml(SolverSettings, config_file("table_solver.yaml"))

@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.resources import config_file, require_positive, settings_from_yaml
@@ -47,17 +46,8 @@ class TransitionSettings:
                     f"transition setting {name} is {value}, allowed is {low} to {high:g}"
                 )
 
-    @classmethod
-    def from_yaml(cls, path: Path | None = None) -> "TransitionSettings":
-        """Read the settings, by default the packaged `config/transitions.yaml`.
-
-        Raises:
-            ConfigurationError: an entry is missing, unknown or impossible.
-        """
-        return settings_from_yaml(cls, path or config_file("transitions.yaml"))
-
 
 @cache
 def transition_settings() -> TransitionSettings:
     """Return the packaged settings, read once."""
-    return TransitionSettings.from_yaml()
+    return settings_from_yaml(TransitionSettings, config_file("transitions.yaml"))
