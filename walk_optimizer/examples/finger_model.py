@@ -10,6 +10,7 @@ from dataclasses import astuple, dataclass, fields
 import casadi as ca
 
 from walk_optimizer.contact.complementarity import ContactPoint
+from walk_optimizer.model.symbolic import SymbolicParameters
 
 # Coordinates: both joint angles from the downward vertical and from the upper link, then the disc's
 # place and angle, anticlockwise positive. Contacts: the tip on the disc, the disc on the table.
@@ -48,12 +49,8 @@ class Finger:
         return list(astuple(self))
 
 
-class SymbolicFinger:
-    """The numbers of a finger as CasADi symbols, under the names of `Finger`.
-
-    Attributes:
-        symbols: All of them in one column, in the order of `Finger.vector`.
-    """
+class SymbolicFinger(SymbolicParameters):
+    """The numbers of a finger as CasADi symbols, in the order of `Finger.vector`."""
 
     base_x: ca.SX
     base_y: ca.SX
@@ -67,10 +64,7 @@ class SymbolicFinger:
 
     def __init__(self) -> None:
         """Create the symbols."""
-        names = [field.name for field in fields(Finger)]
-        for name in names:
-            setattr(self, name, ca.SX.sym(name))
-        self.symbols: ca.SX = ca.vertcat(*(getattr(self, name) for name in names))
+        super().__init__([field.name for field in fields(Finger)])
 
     def elbow(self, q: ca.SX) -> ca.SX:
         """Return the place of the elbow in [m], (2,)."""

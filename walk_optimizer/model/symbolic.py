@@ -1,16 +1,28 @@
-"""The walker's parameters as symbols, so that one compiled function serves every walker."""
+"""Parameters as symbols, so that one compiled function serves every walker."""
+
+from collections.abc import Sequence
 
 import casadi as ca
 
 from walk_optimizer.model.parameters import DYNAMIC_PARAMETERS, GROUND_PARAMETERS
 
 
-class SymbolicWalker:
-    """The parameters of a walker and of its ground as CasADi symbols, under the names they have there.
+class SymbolicParameters:
+    """Parameters as CasADi symbols, under the names they have as numbers.
 
     Attributes:
-        symbols: All of them in one column, in the order of `WalkerParameters.vector`.
+        symbols: All of them in one column, in the order of their names.
     """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        """Create the symbols."""
+        for name in names:
+            setattr(self, name, ca.SX.sym(name))
+        self.symbols: ca.SX = ca.vertcat(*(getattr(self, name) for name in names))
+
+
+class SymbolicWalker(SymbolicParameters):
+    """The parameters of a walker and of its ground, in the order of `WalkerParameters.vector`."""
 
     hip_mass: ca.SX
     upper_leg_mass: ca.SX
@@ -25,10 +37,7 @@ class SymbolicWalker:
 
     def __init__(self) -> None:
         """Create the symbols."""
-        names = DYNAMIC_PARAMETERS + GROUND_PARAMETERS
-        for name in names:
-            setattr(self, name, ca.SX.sym(name))
-        self.symbols: ca.SX = ca.vertcat(*(getattr(self, name) for name in names))
+        super().__init__(DYNAMIC_PARAMETERS + GROUND_PARAMETERS)
 
     @property
     def leg_length(self) -> ca.SX:
