@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from walk_optimizer.transcription.tableau import NODE_COEFFICIENTS, QUADRATURE, STATE_COEFFICIENTS
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +100,11 @@ class RefinedTrajectory:
     def torque(self, index: int, place: float) -> FloatArray:
         """Return u in [N m], (3,), at a place of an interval."""
         values: FloatArray = place ** np.arange(3) @ self._torque_polynomials[index]
+        return values
+
+    def torques_at(self, indices: IntArray, place: float) -> FloatArray:
+        """Return u in [N m], (n, 3), at the same place of n intervals."""
+        values: FloatArray = np.einsum("k,nks->ns", place ** np.arange(3), self._torque_polynomials[indices])
         return values
 
     def force(self, index: int, place: float) -> FloatArray:

@@ -19,8 +19,9 @@ from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.transcription.phases import Modes
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
-_TOLERANCES = {"rtol": 1e-10, "atol": 1e-10}
+_TOLERANCE = 1e-10  # of a step of the integrator, relative and in [rad], [m], [kg m/s]
 # Feet that stand or slip are held on the surface that they are on: of the ground its slope counts.
 _ANY_TREAD = 1.0
 # A foot under load that moves no faster than this sticks, in [m/s].
@@ -67,39 +68,57 @@ def _held(walker: SymbolicWalker, q: ca.SX, leg: int, mode: FootMode) -> tuple[c
     return normal, (normal + against * walker.friction_coefficient * along).T
 
 
-def replay_interval(
-    walker: WalkerParameters, spring: KneeSpring, trajectory: RefinedTrajectory, index: int, state: FloatArray
+@cache
+def _rates(modes: Modes, count: int) -> ca.Function:
+    """Return `_rate_function` for as many states at once, in columns."""
+    return _rate_function(modes).map(count)
+
+
+def _replayed(
+    walker: WalkerParameters,
+    spring: KneeSpring,
+    trajectory: RefinedTrajectory,
+    modes: Modes,
+    indices: IntArray,
+    states: FloatArray,
 ) -> FloatArray:
-    """Return the state (12,) at the end of an interval when its torques act on a state at its start."""
+    """Return the states (n, 12) at the ends of n intervals with the same modes.
+
+    All are integrated side by side from 0 to 1, each over its own length.
+    """
     # Here, not above: loading SciPy takes longer than all the rest of the optimiser.
     from scipy.integrate import solve_ivp
 
-    rate = _rate_function(contact_modes(walker, spring, trajectory, index))
-    parameters = ((spring.stiffness, spring.equilibrium), walker.vector(_ANY_TREAD))
-    length = float(trajectory.lengths[index])
+    count = indices.size
+    rates = _rates(modes, count)
+    springs = np.tile([[spring.stiffness], [spring.equilibrium]], count)
+    walkers = np.tile(np.reshape(walker.vector(_ANY_TREAD), (-1, 1)), count)
+    lengths = trajectory.lengths[indices]
 
-    def derivative(time: float, current: FloatArray) -> FloatArray:
-        torque = trajectory.torque(index, time / length)
-        return np.array(rate(current, torque, *parameters), dtype=float).ravel()
+    def derivative(place: float, current: FloatArray) -> FloatArray:
+        torques = trajectory.torques_at(indices, place)
+        columns = np.array(rates(current.reshape(count, 12).T, torques.T, springs, walkers))
+        return (columns * lengths).T.ravel()
 
-    end: FloatArray = solve_ivp(derivative, (0.0, length), state, method="DOP853", **_TOLERANCES).y[:, -1]
-    return end
-
-
-def contact_modes(
-    walker: WalkerParameters, spring: KneeSpring, trajectory: RefinedTrajectory, index: int
-) -> Modes:
-    """Return what each foot does in an interval, as its forces and velocities at the nodes show."""
-    nodes = trajectory.states[index, 1:].T
-    mechanics = mechanics_at(walker, spring, nodes[:6], nodes[6:])
-    first, second = (
-        _mode(
-            trajectory.forces[index][:, 2 * leg : 2 * leg + 2],
-            walker.terrain.along_and_normal(mechanics.foot_velocity(leg))[0],
-        )
-        for leg in range(2)
+    # The integrator bounds the mean square of all errors, which may come from one interval alone.
+    tolerance = _TOLERANCE / np.sqrt(count)
+    result = solve_ivp(
+        derivative, (0.0, 1.0), states.ravel(), method="DOP853", rtol=tolerance, atol=tolerance
     )
-    return first, second
+    ends: FloatArray = result.y[:, -1].reshape(count, 12)
+    return ends
+
+
+def contact_modes(walker: WalkerParameters, spring: KneeSpring, trajectory: RefinedTrajectory) -> list[Modes]:
+    """Return what each foot does in each interval, as its forces and velocities at the nodes show."""
+    nodes = trajectory.states[:, 1:].reshape(-1, 12).T
+    mechanics = mechanics_at(walker, spring, nodes[:6], nodes[6:])
+    slips = [walker.terrain.along_and_normal(mechanics.foot_velocity(leg))[0] for leg in range(2)]
+    first, second = (slip.reshape(trajectory.intervals, -1) for slip in slips)
+    return [
+        (_mode(forces[:, :2], one), _mode(forces[:, 2:], other))
+        for forces, one, other in zip(trajectory.forces, first, second, strict=True)
+    ]
 
 
 def _mode(forces: FloatArray, slip: FloatArray) -> FootMode:
@@ -119,11 +138,12 @@ def interval_errors(
 
     Each interval is replayed from its own start.
     """
-    ends = [
-        replay_interval(walker, spring, trajectory, index, trajectory.states[index, 0])
-        for index in range(trajectory.intervals)
-    ]
-    errors: FloatArray = np.abs(np.array(ends) - trajectory.states[:, -1])[:, :6].max(axis=1)
+    modes = contact_modes(walker, spring, trajectory)
+    ends = np.empty_like(trajectory.states[:, 0])
+    for mode in dict.fromkeys(modes):
+        indices = np.array([index for index, one in enumerate(modes) if one == mode])
+        ends[indices] = _replayed(walker, spring, trajectory, mode, indices, trajectory.states[indices, 0])
+    errors: FloatArray = np.abs(ends - trajectory.states[:, -1])[:, :6].max(axis=1)
     return errors
 
 
@@ -134,9 +154,9 @@ def replay_step(walker: WalkerParameters, spring: KneeSpring, trajectory: Refine
     as it does in the solution.
     """
     state: FloatArray = trajectory.states[0, 0]
-    for index in range(trajectory.intervals):
+    for index, modes in enumerate(contact_modes(walker, spring, trajectory)):
         jump = trajectory.states[index, 0] - trajectory.states[index - 1, -1]
         if index and trajectory.impulses[index].any():
             state = state + jump
-        state = replay_interval(walker, spring, trajectory, index, state)
+        state = _replayed(walker, spring, trajectory, modes, np.array([index]), state[None])[0]
     return state

@@ -34,10 +34,7 @@ def test_its_stance_foot_slips_forward_on_both_grids(slippery):
     parts = (trajectory.q, trajectory.p, trajectory.reaction)
     schedule = schedule_of(slippery.walker, REQUEST.step_length, *parts)
     assert FootMode.SLIP_FORWARD in schedule[0]
-    modes = [
-        contact_modes(slippery.walker, refined.spring, refined.trajectory, index)[0]
-        for index in range(refined.trajectory.intervals)
-    ]
+    modes = [first for first, _ in contact_modes(slippery.walker, refined.spring, refined.trajectory)]
     order = [mode for index, mode in enumerate(modes) if index == 0 or mode is not modes[index - 1]]
     assert order == [FootMode.STICK, FootMode.SLIP_FORWARD, FootMode.STICK]
 
@@ -57,10 +54,8 @@ def test_following_the_slip_needs_less_torque_than_single_support(slippery):
 
 def test_friction_that_does_not_oppose_the_slip_fully_is_found(slippery):
     refined = slippery.refined
-    slips = [
-        contact_modes(slippery.walker, refined.spring, refined.trajectory, index)[0].slips
-        for index in range(refined.trajectory.intervals)
-    ]
+    modes = contact_modes(slippery.walker, refined.spring, refined.trajectory)
+    slips = [first.slips for first, _ in modes]
     forces = refined.trajectory.forces.copy()
     forces[np.flatnonzero(slips), :, 0] *= 0.99
     broken = replace(refined, trajectory=replace(refined.trajectory, forces=forces))

@@ -91,7 +91,7 @@ def observed_phases(gait: Gait) -> tuple[Phase, ...]:
     """Return the phases of a gait's step, read off the forces, impulses and velocities of its feet."""
     refined = refined_of(gait)
     trajectory = refined.trajectory
-    modes = [contact_modes(gait.walker, refined.spring, trajectory, i) for i in range(trajectory.intervals)]
+    modes = contact_modes(gait.walker, refined.spring, trajectory)
     impacts = [_impact(impulse) for impulse in trajectory.impulses]
     later = range(1, trajectory.intervals)
     starts = [0, *(i for i in later if modes[i] != modes[i - 1] or impacts[i] != (_FREE, _FREE))]
