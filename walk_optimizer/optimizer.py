@@ -14,6 +14,7 @@ from walk_optimizer.certificate import certify, landing_distance
 from walk_optimizer.contact.schedule import CONTACT_FAMILIES
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import Certificate, CertificateEntry, Gait, Trajectory
+from walk_optimizer.guess import Start
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.refinement import refined_gait
 from walk_optimizer.request import GaitRequest
@@ -118,10 +119,11 @@ class _Pipeline:
         optima = distinct(candidates)
         if self.session.stopped or not optima:
             return self._failure(candidates)
-        freed = [self._freed(one) for one in optima[: self.settings.freed_optima]]
+        freed = self.session.map(self._freed, optima[: self.settings.freed_optima])
         if self.session.verdict is Status.CANCELLED:
             return self._failure(candidates)
-        return self._certified(min(freed, key=lambda one: one.mean_effort))
+        # None is freed if the time is over by now.
+        return self._certified(min([*freed, optima[0]], key=lambda one: one.mean_effort))
 
     def _freed(self, candidate: Candidate) -> Candidate:
         rounds, iterations = self.settings.contact_rounds, self.settings.contact_iterations
@@ -130,28 +132,26 @@ class _Pipeline:
     def _from_kinematics(self) -> list[Candidate]:
         """Return the optima on the requested grid that the kinematic starts lead to."""
         coarse_points = min(self.settings.coarse_points, self.request.points)
-        coarse: list[Candidate] = []
-        for start in kinematic_starts(self.walker, self.request.spring_mode):
-            if not self.session.stopped:
-                coarse.append(self.search.from_start(start, coarse_points))
-                self.starts += 1
+
+        def from_start(start: Start) -> Candidate:
+            return self.search.from_start(start, coarse_points)
+
+        def with_contacts(pair: tuple[Candidate, str]) -> Candidate:
+            return self.search.with_family(*pair, coarse_points, "search")
+
+        def on_grid(one: Candidate) -> Candidate:
+            return self.search.with_family(one, one.contacts, self.request.points, "fixed_schedule")
+
+        coarse = self.session.map(from_start, kinematic_starts(self.walker, self.request.spring_mode))
+        self.starts += len(coarse)
         kept = self.settings.kept_starts
-        families = [
-            self.search.with_family(candidate, contacts, coarse_points, "search")
-            for candidate, contacts in product(distinct(coarse)[:kept], CONTACT_FAMILIES)
-            if not self.session.stopped
-        ]
-        fine = [
-            self.search.with_family(one, one.contacts, self.request.points, "fixed_schedule")
-            for one in distinct(families)[:kept]
-            if not self.session.stopped
-        ]
-        return fine or coarse
+        families = self.session.map(with_contacts, [*product(distinct(coarse)[:kept], CONTACT_FAMILIES)])
+        return self.session.map(on_grid, distinct(families)[:kept]) or coarse
 
     def _from_seeds(self, seeds: Sequence[Gait]) -> list[Candidate]:
         """Return the optima that continue the seeds."""
         self.starts += len(seeds)
-        return [candidate for seed in seeds for candidate in self.search.from_gait(seed)]
+        return [candidate for found in self.session.map(self.search.from_gait, seeds) for candidate in found]
 
     def _certified(self, best: Candidate) -> Outcome:
         """Return the gait of a solved candidate, unless its certificate fails."""

@@ -97,7 +97,10 @@ def refine(gait: Gait, session: SolveSession) -> RefinedSolution:
     """
     solves = RefinedSolves(gait.request, gait.walker, session)
     first = FirstGuess(gait)
-    solutions = [_begun(solves, first, mesh) for mesh in first.meshes()]
+    meshes = first.meshes()
+    solutions = session.map(lambda mesh: _begun(solves, first, mesh), meshes)
+    if not solutions:
+        return RefinedSolution(session.verdict or Status.TIME_LIMIT, meshes[0], None, gait.spring)
     best, *others = sorted(solutions, key=lambda one: one.effort)
     adapted = solves.adapted(best)
     while not adapted.met and others and not session.stopped:

@@ -140,7 +140,9 @@ def test_a_failure_of_the_solver_is_told_in_its_own_words(walker, monkeypatch):
     assert "; it says Internal_Error; " in report.message
 
 
-def test_progress_runs_through_the_stages_and_ends_at_the_cost_of_the_gait(walker):
+def test_progress_runs_through_the_stages_and_ends_at_the_cost_of_the_gait(walker, monkeypatch):
+    # One process, whose progress is all there is to tell.
+    monkeypatch.setattr(session_module, "processor_count", lambda: 1)
     told = []
     outcome = optimize(REQUEST, walker, progress=lambda progress: told.append(progress) or True)
     stages = list(dict.fromkeys(progress.stage for progress in told))

@@ -1,9 +1,6 @@
 """Runs a solver that can't be interrupted in a child process, which can be killed."""
 
-import ctypes
 import multiprocessing
-import signal
-import warnings
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
@@ -11,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from walk_optimizer.solve.back_end import ended
+from walk_optimizer.solve.sharing import die_with_parent, start_fork
 from walk_optimizer.solve.solution import FloatArray, IterationState, Monitor, Solution
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription.program import Problem
 
 # How often the monitor is asked whether to go on, in [s].
 _PERIOD = 0.1
-_PR_SET_PDEATHSIG = 1
 
 
 def isolated(
@@ -36,13 +33,8 @@ def isolated(
     """
     at_start = ended(problem, start, Status.SOLVER_ERROR, 0, "the solver's process ended")
     state = IterationState(0, at_start.objective, at_start.infeasibility)
-    context = multiprocessing.get_context("fork")
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_run, args=(function, sender), daemon=True)
-    with warnings.catch_warnings():
-        # Only this thread's memory is used in the child, whatever other threads there are.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        process.start()
+    receiver, sender = multiprocessing.get_context("fork").Pipe(duplex=False)
+    process = start_fork(_run, function, sender)
     sender.close()
     try:
         while True:
@@ -68,9 +60,7 @@ def _received(receiver: "Connection[Any, Any]", at_start: Solution) -> Solution:
 
 
 def _run(function: Callable[[], Solution], sender: "Connection[Any, Any]") -> None:
-    # A parent that is killed can't kill its child any more.
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    die_with_parent()
     try:
         one = function()
     except Exception as error:  # noqa: BLE001  # whatever the solver raised, the parent is told

@@ -1,13 +1,20 @@
 """One request's solves: a common clock, cancelling and progress over all of its stages."""
 
+import os
 import time
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from walk_optimizer.solve.back_end import SolveOptions
 from walk_optimizer.solve.registry import back_end
 from walk_optimizer.solve.settings import SolverSettings
+from walk_optimizer.solve.sharing import Shares, processor_count
 from walk_optimizer.solve.solution import FloatArray, IterationState, Solution
 from walk_optimizer.solve.status import Progress, ProgressCallback, Status
 from walk_optimizer.transcription.program import Problem
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
 
 
 class SolveSession:
@@ -31,6 +38,7 @@ class SolveSession:
         self._begin = time.monotonic()
         self.verdict: Status | None = None
         self.iterations = 0
+        self._last: Progress | None = None
 
     @property
     def elapsed(self) -> float:
@@ -75,12 +83,47 @@ class SolveSession:
         self.iterations += solution.iterations
         return solution
 
+    def map(self, function: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
+        """Return what a function of solves gives for each item, all processors working on them.
+
+        Progress is told of this process's share. Once the session is stopped, the rest is left out.
+
+        Args:
+            function: May use this session; its results can be pickled.
+            items: Independent of each other.
+        """
+        if self.stopped:
+            return []
+        iterations = self.iterations
+        own = os.getpid()
+
+        def work(number: int) -> tuple[_Result, int]:
+            if os.getpid() != own:
+                self._progress = None
+            before = self.iterations
+            result = function(items[number])
+            return result, self.iterations - before
+
+        shares = Shares(work, len(items))
+        done = shares.done(processor_count(), lambda: self.stopped, lambda: self._asked(self.elapsed))
+        for number in range(len(items)):
+            if number not in done and not self.stopped:
+                done[number] = work(number)  # of a fork that was lost
+        self.iterations = iterations + sum(spent for _, spent in done.values())
+        return [done[number][0] for number in sorted(done)]
+
     def _watch(self, state: IterationState, stage: str, objective_unit: float) -> Status | None:
-        if self.verdict is None and self.elapsed > self._time_limit:
+        objective, now = state.objective * objective_unit, self.elapsed
+        self._last = Progress(stage, state.iteration, objective, state.infeasibility, now)
+        return self._asked(now)
+
+    def _asked(self, now: float) -> Status | None:
+        """Return the verdict, after a look at the clock and a question to the caller."""
+        if self.verdict is None and now > self._time_limit:
             self.verdict = Status.TIME_LIMIT
-        if self.verdict is None and self._progress is not None:
-            objective = state.objective * objective_unit
-            progress = Progress(stage, state.iteration, objective, state.infeasibility, self.elapsed)
-            if not self._progress(progress):
-                self.verdict = Status.CANCELLED
+        if self.verdict is None and not self._wanted():
+            self.verdict = Status.CANCELLED
         return self.verdict
+
+    def _wanted(self) -> bool:
+        return self._progress is None or self._last is None or self._progress(self._last)

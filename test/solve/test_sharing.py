@@ -1,0 +1,157 @@
+"""Independent solves are shared out between processes, and come back as if one had done them."""
+
+import multiprocessing
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+from solve.small_programs import START, rosenbrock
+
+from walk_optimizer.solve import session as session_module
+from walk_optimizer.solve.session import SolveSession
+from walk_optimizer.solve.settings import solver_settings
+from walk_optimizer.solve.sharing import Shares
+from walk_optimizer.solve.status import Status
+
+
+def never():
+    return False
+
+
+def who(number):
+    time.sleep(0.05)
+    return os.getpid()
+
+
+@pytest.fixture
+def session(monkeypatch):
+    monkeypatch.setattr(session_module, "processor_count", lambda: 2)
+    return SolveSession(solver_settings(), 60.0, None)
+
+
+def running_children():
+    return multiprocessing.active_children()
+
+
+@pytest.mark.parametrize("processes", [1, 2, 3])
+def test_every_piece_is_done_once_by_as_many_processes_as_asked(processes):
+    results = Shares(who, 12).done(processes, never, int)
+    assert sorted(results) == list(range(12))
+    assert len(set(results.values())) == processes
+    assert os.getpid() in results.values()
+    assert running_children() == []
+
+
+def test_no_more_processes_than_pieces_and_none_for_nothing():
+    assert set(Shares(who, 1).done(4, never, int).values()) == {os.getpid()}
+    assert Shares(who, 0).done(4, never, int) == {}
+
+
+def test_a_stop_ends_the_forks_at_once():
+    begin = time.monotonic()
+    own = os.getpid()
+
+    def work(number):
+        time.sleep(0.1 if os.getpid() == own else 60)
+        return number
+
+    results = Shares(work, 100).done(2, lambda: time.monotonic() - begin > 0.5, int)
+    assert time.monotonic() - begin < 10
+    assert 1 <= len(results) < 100
+    assert running_children() == []
+
+
+def test_the_session_maps_in_order_and_counts_all_iterations(session):
+    starts = [START + 0.1 * k for k in range(6)]
+
+    def solve(start):
+        return session.solve(rosenbrock(), start, "search", objective_unit=1.0)
+
+    alone = [solve(start) for start in starts]
+    counted = session.iterations
+    shared = session.map(solve, starts)
+    assert session.iterations == 2 * counted
+    for one, other in zip(alone, shared, strict=True):
+        assert one.status is other.status is Status.SOLVED
+        np.testing.assert_array_equal(one.x, other.x)
+
+
+def test_what_a_lost_fork_had_is_done_again(session):
+    own = os.getpid()
+
+    def work(number):
+        time.sleep(0.05)
+        if os.getpid() != own:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return number
+
+    assert session.map(work, range(6)) == list(range(6))
+
+
+def test_an_error_in_a_fork_is_raised_here(session):
+    own = os.getpid()
+
+    def work(number):
+        time.sleep(0.05)
+        if number == 3:
+            raise ValueError("number three")
+        return os.getpid() == own
+
+    with pytest.raises(ValueError, match="number three"):
+        session.map(work, range(6))
+    assert running_children() == []
+
+
+def test_a_cancel_while_forks_work_ends_the_map(monkeypatch):
+    monkeypatch.setattr(session_module, "processor_count", lambda: 2)
+    own, told = os.getpid(), []
+
+    def progress(one):
+        told.append(one)
+        return False
+
+    session = SolveSession(solver_settings(), 60.0, progress)
+
+    def work(start):
+        if os.getpid() != own:
+            time.sleep(60)
+        return session.solve(rosenbrock(), start, "search", objective_unit=1.0)
+
+    begin = time.monotonic()
+    session.map(work, [START, START, START])
+    assert time.monotonic() - begin < 10
+    assert session.verdict is Status.CANCELLED
+    assert told
+    assert session.map(work, [START]) == [], "nothing more is tried"
+
+
+def test_the_time_limit_ends_the_map(monkeypatch):
+    monkeypatch.setattr(session_module, "processor_count", lambda: 2)
+    session = SolveSession(solver_settings(), 0.3, None)
+    own = os.getpid()
+
+    def work(start):
+        time.sleep(0.1 if os.getpid() == own else 60)
+        return session.solve(rosenbrock(), start, "search", objective_unit=1.0)
+
+    begin = time.monotonic()
+    session.map(work, [START] * 100)
+    assert time.monotonic() - begin < 10
+    assert session.verdict is Status.TIME_LIMIT
+
+
+def test_the_time_limit_counts_while_it_waits_for_others(monkeypatch):
+    monkeypatch.setattr(session_module, "processor_count", lambda: 2)
+    session = SolveSession(solver_settings(), 0.5, None)
+    own = os.getpid()
+
+    def work(number):
+        time.sleep(0.1 if os.getpid() == own else 60)
+        return number
+
+    begin = time.monotonic()
+    session.map(work, range(2))
+    assert time.monotonic() - begin < 10
+    assert session.verdict is Status.TIME_LIMIT

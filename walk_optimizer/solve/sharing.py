@@ -1,0 +1,116 @@
+"""Shares independent pieces of work out between this process and forks of it."""
+
+import contextlib
+import ctypes
+import multiprocessing
+import os
+import signal
+import warnings
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import Any, Generic, TypeVar
+
+_One = TypeVar("_One")
+
+# How often a process that waits for others asks whether to go on, in [s].
+_PERIOD = 0.1
+_PR_SET_PDEATHSIG = 1
+
+
+def die_with_parent() -> None:
+    """Have the kernel kill this fork when its parent ends: a parent that is killed can't do it any more."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    # Ctrl-C in a terminal is the parent's to deal with.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def start_fork(target: Callable[..., None], *arguments: Any) -> BaseProcess:
+    """Start a fork of this process, which has all that was built here without building it again."""
+    process = multiprocessing.get_context("fork").Process(target=target, args=arguments)
+    with warnings.catch_warnings():
+        # Only this thread's memory is used in the child, whatever other threads there are.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        process.start()
+    return process
+
+
+class Shares(Generic[_One]):
+    """Pieces of work by number, each taken by the process that is free first."""
+
+    def __init__(self, work: Callable[[int], _One], count: int) -> None:
+        """Take the work.
+
+        Args:
+            work: Does piece 0 to count - 1; its results can be pickled.
+            count: Number of pieces.
+        """
+        self._work, self._count = work, count
+        self._next = multiprocessing.get_context("fork").Value("i", 0)
+
+    def done(
+        self, processes: int, stopped: Callable[[], bool], waiting: Callable[[], object]
+    ) -> dict[int, _One]:
+        """Return the results by number; those of a stop or of a fork that was lost are missing.
+
+        Args:
+            processes: How many work on it, this one included.
+            stopped: Whether to leave the rest, asked after each piece and while waiting for others.
+            waiting: Called again and again while this process waits for others.
+        """
+        forks = [self._fork() for _ in range(min(processes, self._count) - 1)]
+        try:
+            results = self._taken(stopped)
+            for _, connection in forks:
+                while not stopped():
+                    if connection.poll(_PERIOD):
+                        results |= _received(connection)
+                        break
+                    waiting()
+        finally:
+            for process, connection in forks:
+                process.kill()
+                process.join()
+                connection.close()
+        return results
+
+    def _taken(self, stopped: Callable[[], bool]) -> dict[int, _One]:
+        """Work until nothing is left, or a stop."""
+        results: dict[int, _One] = {}
+        while (number := self._taken_number()) < self._count:
+            results[number] = self._work(number)
+            if stopped():
+                break
+        return results
+
+    def _taken_number(self) -> int:
+        with self._next.get_lock():
+            number: int = self._next.value
+            self._next.value += 1
+        return number
+
+    def _fork(self) -> "tuple[BaseProcess, Connection[Any, Any]]":
+        receiver, sender = multiprocessing.get_context("fork").Pipe(duplex=False)
+        process = start_fork(self._run, sender)
+        sender.close()
+        return process, receiver
+
+    def _run(self, sender: "Connection[Any, Any]") -> None:
+        die_with_parent()
+        # What fails here is done once more by the parent, where it can be told what it was.
+        with contextlib.suppress(Exception):
+            sender.send(self._taken(lambda: False))
+
+
+def _received(connection: "Connection[Any, Any]") -> dict[int, Any]:
+    """Return the results of a fork; none of one that was lost."""
+    try:
+        results: dict[int, Any] = connection.recv()
+    except EOFError:
+        return {}
+    return results
+
+
+def processor_count() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0))
