@@ -5,7 +5,8 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from walk_optimizer.nodes.pacer import Pacer
+from walk_optimizer.nodes.pacer import Pacer, Schedule
+from walk_optimizer.tick_statistics import TickStatistics
 
 PERIOD = 0.002
 
@@ -28,6 +29,22 @@ def test_ticks_never_come_in_a_burst_and_what_was_late_is_counted():
         for second in range(first + 1, len(times)):
             assert times[second] - times[first] > (second - first - 1) * PERIOD - 1e-4
     assert pacer.missed >= 99
+
+
+@pytest.mark.parametrize(
+    ("began", "ended", "following"),
+    [
+        (5.0, 5.3, 6),
+        (5.0, 6.4, 6),  # Made up for at once.
+        (5.0, 6.6, 7),  # Too late: dropped.
+        (7.2, 7.3, 8),  # Never two ticks within one period.
+        (5.0, 105.6, 106),
+    ],
+)
+def test_a_tick_is_made_up_for_only_where_it_is_little_late(began, ended, following):
+    schedule = Schedule(begin=100.0, period=PERIOD, statistics=TickStatistics(PERIOD))
+    times = [schedule.begin + periods * PERIOD for periods in (began, ended)]
+    assert schedule.next_number(5, *times) == following
 
 
 def test_stop_waits_for_the_last_tick():

@@ -1,22 +1,22 @@
 """Start and stop a node: Ctrl-C and SIGTERM end it in order, with exit code 0."""
 
+import gc
+import os
 import signal
 import sys
 import threading
 import time
 from collections.abc import Callable
-from types import FrameType
 
 import rclpy
 from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 from walk_optimizer.errors import WalkOptimizerError
 from walk_optimizer.nodes.suite_node import SuiteNode
 
-# How soon a signal is noticed while nothing else happens, in [s].
-_SIGNAL_PERIOD = 0.1
 # How long the node still answers after it was told to stop, in [s].
 _LAST_WORDS = 0.2
 
@@ -46,29 +46,47 @@ def _refused(error: Exception) -> int:
     return 1
 
 
-def _stop_on_signals() -> threading.Event:
-    stop = threading.Event()
+def _stop_on_signals() -> Future:
+    """Return a future that SIGINT and SIGTERM complete.
 
-    def note(_number: int, _frame: FrameType | None) -> None:
-        stop.set()
+    Python runs handlers in the main thread, which waits outside of Python for the executor's next event. So
+    another thread is told by way of a pipe: a main thread that looked every so often would hold up others.
+    """
+    stop, (outlet, inlet) = Future(), os.pipe()
 
+    def watch() -> None:
+        while os.read(outlet, 1):
+            stop.set_result(None)
+
+    os.set_blocking(inlet, False)
+    signal.set_wakeup_fd(inlet)
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, note)
+        signal.signal(number, lambda *_: None)
+    threading.Thread(target=watch, name="signals", daemon=True).start()
     return stop
 
 
-def _spin(node: SuiteNode, stop: threading.Event) -> None:
+def _spin(node: SuiteNode, stop: Future) -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(node)
+    # A task ends its waiting; to be woken up alone does not.
+    stop.add_done_callback(lambda _: executor.create_task(lambda: None))
     try:
         node.begin()
         node.announce()
-        while not stop.is_set():
+        _forget_the_start()
+        while not stop.done():
             _spin_once(node, executor)
     finally:
         node.close()
         _answer_the_waiting(node, executor)
         executor.shutdown()
+
+
+def _forget_the_start() -> None:
+    """Have Python no longer look for garbage among what the start has made, which stays."""
+    gc.collect()
+    gc.freeze()
 
 
 def _answer_the_waiting(node: SuiteNode, executor: SingleThreadedExecutor) -> None:
@@ -78,7 +96,7 @@ def _answer_the_waiting(node: SuiteNode, executor: SingleThreadedExecutor) -> No
         _spin_once(node, executor, _LAST_WORDS / 10)
 
 
-def _spin_once(node: SuiteNode, executor: SingleThreadedExecutor, timeout: float = _SIGNAL_PERIOD) -> None:
+def _spin_once(node: SuiteNode, executor: SingleThreadedExecutor, timeout: float | None = None) -> None:
     try:
         executor.spin_once(timeout_sec=timeout)
     except Exception as error:  # noqa: BLE001  # e.g. a client that left before its answer: the node lives on
