@@ -9,8 +9,8 @@ Item = TypeVar("Item")
 class Inbox(Generic[Item]):
     """Takes items without ever waiting, and hands them over in whole batches.
 
-    The lock is held for a few instructions only, whatever the disk does, and the taker empties the
-    queue in one exchange: so a caller with a period of 1 ms does not notice it.
+    The lock is held for a few instructions only, whatever the disk does, and the taker, whom no item wakes,
+    empties the queue in one exchange: so a caller with a period of 1 ms does not notice it.
     """
 
     def __init__(self, limit: int) -> None:
@@ -22,8 +22,8 @@ class Inbox(Generic[Item]):
         self._limit = limit
         self._items: list[Item] = []
         self._rejected = 0
-        self._closed = False
-        self._changed = threading.Condition()
+        self._closed = threading.Event()
+        self._lock = threading.Lock()
 
     @property
     def rejected(self) -> int:
@@ -33,7 +33,7 @@ class Inbox(Generic[Item]):
     @property
     def closed(self) -> bool:
         """Whether the queue takes nothing any more."""
-        return self._closed
+        return self._closed.is_set()
 
     def __len__(self) -> int:
         """Items that wait."""
@@ -45,12 +45,11 @@ class Inbox(Generic[Item]):
         Returns:
             Whether the item was taken; one that was not is counted.
         """
-        with self._changed:
-            if self._closed or len(self._items) >= self._limit:
+        with self._lock:
+            if self.closed or len(self._items) >= self._limit:
                 self._rejected += 1
                 return False
             self._items.append(item)
-            self._changed.notify()
             return True
 
     def push(self, item: Item) -> bool:
@@ -59,30 +58,27 @@ class Inbox(Generic[Item]):
         Returns:
             Whether the queue was open.
         """
-        with self._changed:
-            if not self._closed:
+        with self._lock:
+            if not self.closed:
                 self._items.append(item)
-                self._changed.notify()
-            return not self._closed
+            return not self.closed
 
-    def take(self, timeout: float) -> tuple[list[Item], bool]:
-        """Wait for items and take all of them.
+    def take(self, patience: float) -> tuple[list[Item], bool]:
+        """Let items gather, and take all of them.
 
         Args:
-            timeout: Longest wait in [s].
+            patience: How long they gather in [s]; less if the queue is closed meanwhile.
 
         Returns:
-            The items in their order, none after the timeout; and whether the queue was closed by
-            then, so that no further ones follow.
+            The items in their order, maybe none; and whether the queue was closed by then, so that no
+            further ones follow.
         """
-        with self._changed:
-            if not self._items and not self._closed:
-                self._changed.wait(timeout)
+        self._closed.wait(patience)
+        with self._lock:
             items, self._items = self._items, []
-            return items, self._closed
+            return items, self.closed
 
     def close(self) -> None:
         """Take nothing any more; what waits can still be taken."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify()
+        with self._lock:
+            self._closed.set()

@@ -20,6 +20,9 @@ from walk_optimizer.recording.topics import TopicInfo, require_message, require_
 DROPPED_KEY = "dropped_messages"
 """Key in the custom data of metadata.yaml under which a bag owns up to its gaps."""
 
+# So long messages gather in [s]: a thread that woke up for each would hold up those who write.
+_GATHERING = 0.02
+
 _logger = logging.getLogger(__name__)
 
 
@@ -189,7 +192,7 @@ class Recorder:
         next_flush = time.monotonic() + self.settings.flush_period
         closed = False
         while not closed:
-            items, closed = self._take(max(0.0, next_flush - time.monotonic()))
+            items, closed = self._take(min(max(0.0, next_flush - time.monotonic()), _GATHERING))
             for item in items:
                 self._store(writer, item)
             if time.monotonic() >= next_flush:
@@ -198,9 +201,9 @@ class Recorder:
                 next_flush = time.monotonic() + self.settings.flush_period
             self._note_progress(writer)
 
-    def _take(self, timeout: float) -> tuple[list[_Entry | TopicInfo], bool]:
+    def _take(self, patience: float) -> tuple[list[_Entry | TopicInfo], bool]:
         """Take what waits in the queue, and count the messages that are from now on ours to store."""
-        items, closed = self._inbox.take(timeout)
+        items, closed = self._inbox.take(patience)
         self._taken += sum(isinstance(item, _Entry) for item in items)
         return items, closed
 
