@@ -44,6 +44,8 @@ PERCENTILES = (50.0, 99.0, 99.9)
 SETTLING = 1.0
 # Of a period, to find where most messages lie.
 _BINS = 50
+# Messages that are early by less are those of the tick that is about to be due, in periods.
+_JITTER = 0.1
 _TICKS_PER_SECOND = os.sysconf("SC_CLK_TCK")
 
 
@@ -180,7 +182,7 @@ def lateness(times):
     late, due = [], np.round(times[0])
     for now in times.tolist():
         late.append(max(now - due, 0.0))
-        due = max(due + 1, np.ceil(now - 0.25))
+        due = max(due, np.floor(now + _JITTER)) + 1
     return np.array(late)
 
 
