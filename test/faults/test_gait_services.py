@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from library.made_up_gait import made_up_gait
 from nodes.conftest import FAST, HIP_MASS, SLOW
-from nodes.graph import children_of, exists, is_worker
+from nodes.graph import children_of, exists, workers_of
 from rclpy.parameter import Parameter
 from walk_optimizer_interfaces.msg import GaitTable
 from walk_optimizer_interfaces.srv import GetGait, ListGaits, OptimizeGait
@@ -228,7 +228,7 @@ def test_an_optimizer_that_is_killed_is_told_and_its_successor_is_asked(graph, s
     optimizer = start("gait_optimizer", walker_file=stocked["walker_file"])
     graph.spin_until(lambda: "ready" in optimizer.output(), "the optimizer")
     waiting = graph.send(GetGait, GET, speed=0.4, spring_mode="none")
-    graph.spin_until(lambda: any(map(is_worker, children_of(optimizer.process.pid))), "the worker")
+    graph.spin_until(lambda: workers_of(optimizer.process.pid), "the worker")
     # Longer than the library looks for the optimizer: now it waits for the answer.
     graph.spin_for(4.0)
     # The library answers others while it waits.

@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from nodes.conftest import FAST, SLOW, stock
-from nodes.graph import assert_left_cleanly, children_of, exists, is_worker
+from nodes.graph import assert_left_cleanly, exists, workers_of
 from nodes.walking import MODE, NODE, Walker, assert_continuous, stamp_ns
 from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
@@ -222,7 +222,7 @@ def solving(graph, start, stocked, other_walker, tmp_path):
 
 
 def workers(walker):
-    return [child for child in children_of(walker.process.process.pid) if is_worker(child)]
+    return workers_of(walker.process.process.pid)
 
 
 def test_a_solve_for_steps_may_lose_its_process_be_overtaken_and_end_with_the_node(graph, solving):

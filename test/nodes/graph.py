@@ -129,6 +129,17 @@ def assert_left_cleanly(node, code):
 
 def children_of(pid):
     """Return the ids of the processes that a process has started, and of theirs."""
+    return [one for child in _started_by(pid) for one in (child, *children_of(child))]
+
+
+def workers_of(pid):
+    """Return the ids of an optimiser's workers: no forks of theirs, and not Python's tracker of resources."""
+    return [
+        child for child in _started_by(pid) if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()
+    ]
+
+
+def _started_by(pid):
     found = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -136,16 +147,10 @@ def children_of(pid):
         except OSError:
             continue
         if int(parent) == pid and state != "Z":
-            child = int(path.parent.name)
-            found += [child, *children_of(child)]
+            found.append(int(path.parent.name))
     return found
 
 
 def exists(pid):
     """Whether a process is still there."""
     return Path(f"/proc/{pid}").exists()
-
-
-def is_worker(pid):
-    """Whether a process is a worker of the optimiser, and not Python's tracker of resources."""
-    return b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()

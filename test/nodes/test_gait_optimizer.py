@@ -8,7 +8,7 @@ pytest.importorskip("rclpy")
 
 from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from nodes.graph import assert_left_cleanly, children_of, exists, is_worker
+from nodes.graph import assert_left_cleanly, children_of, exists, workers_of
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from walk_optimizer_interfaces.action import OptimizeGait as OptimizeGaitAction
@@ -108,7 +108,7 @@ def test_the_node_answers_during_a_solve_and_cancel_ends_the_worker(graph, optim
     progress = goal.wait_for_progress()
     assert progress.stage
     assert progress.elapsed >= 0
-    workers = [pid for pid in children_of(optimizer.process.pid) if is_worker(pid)]
+    workers = workers_of(optimizer.process.pid)
     refused = graph.call(OptimizeGait, SERVICE, speed=-1.0, spring_mode="none")
     assert not refused.success
     assert graph.get_parameter("gait_optimizer", "queue_limit").integer_value == 2
@@ -201,7 +201,7 @@ def test_diagnostics_tell_of_workers_queue_and_the_last_outcome(graph, own_optim
     assert (values["running"], values["queue_limit"]) == ("1", "2")
     graph.send(OptimizeGait, f"own/{SERVICE}", **ENDLESS | {"points": 1998})
     wait_for("workers", "the queue is full", DiagnosticStatus.WARN)
-    (worker,) = (pid for pid in children_of(own_optimizer.process.pid) if is_worker(pid))
+    (worker,) = workers_of(own_optimizer.process.pid)
     os.kill(worker, signal.SIGKILL)
     values = wait_for("solves", "the worker process ended before it answered", DiagnosticStatus.WARN)
     assert (values["failed"], values["last_status"]) == ("1", "worker_lost")
@@ -214,7 +214,7 @@ def test_two_clients_share_a_solve_and_a_killed_worker_is_told_to_both(graph, op
     goal.wait_for_progress()
     other = graph.send(OptimizeGait, SERVICE, **ENDLESS)
     graph.spin_for(0.5)
-    (worker,) = (pid for pid in children_of(optimizer.process.pid) if is_worker(pid))
+    (worker,) = workers_of(optimizer.process.pid)
     os.kill(worker, signal.SIGKILL)
     status, result = goal.result()
     assert status == GoalStatus.STATUS_ABORTED
