@@ -36,6 +36,7 @@ LAYERS = (
         "report_table",
     ),
     ("transition",),
+    ("warm_start",),
     ("profile", "references", "reference_check", "background"),
     (
         "joint_limits",

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 from walk_optimizer.errors import SolveFailedError
 from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.optimizer import Outcome, optimize
+from walk_optimizer.library import GaitLibrary
+from walk_optimizer.optimizer import Outcome
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import Progress, ProgressCallback, SolveReport, Status
 from walk_optimizer.solve.worker import WorkerPool
 from walk_optimizer.solve.worker_task import SolveStoppedError, Ticket
+from walk_optimizer.warm_start import optimize_from
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,8 @@ class GaitJob:
 
 def solve_job(job: GaitJob, progress: ProgressCallback) -> Outcome:
     """Solve a job, in the worker process."""
-    return optimize(job.request, job.walker, time_limit=job.time_limit, progress=progress)
+    library = GaitLibrary(job.walker)
+    return optimize_from(library, job.request, job.walker, time_limit=job.time_limit, progress=progress)
 
 
 def submit_gait(

@@ -19,6 +19,7 @@ def no_work(monkeypatch):
         raise AssertionError("a solve began")
 
     monkeypatch.setattr(gaits, "optimize", never)
+    monkeypatch.setattr(gaits, "optimize_from", never)
     monkeypatch.setattr("walk_optimizer.reference_solve.solve_reference", never)
 
 
@@ -44,14 +45,19 @@ def test_a_missing_solver_says_what_to_install(no_work, capsys, monkeypatch):
 def test_the_choice_reaches_the_optimiser(monkeypatch, capsys):
     asked = []
 
-    def optimize(request, walker, *, settings, **options):
-        asked.append(settings.back_end)
-        return Outcome(None, SolveReport(Status.INFEASIBLE, "none", settings.back_end))
+    def solving(name):
+        def optimize(*arguments, settings, **options):
+            asked.append((name, settings.back_end))
+            return Outcome(None, SolveReport(Status.INFEASIBLE, "none", settings.back_end))
 
-    monkeypatch.setattr(gaits, "optimize", optimize)
+        return optimize
+
+    monkeypatch.setattr(gaits, "optimize_from", solving("neighbours"))
+    monkeypatch.setattr(gaits, "optimize", solving("scratch"))
     assert main(["solve", "--speed", "0.42", "--solver", "uno"]) == 1
     assert main(["solve", "--speed", "0.42"]) == 1
-    assert asked == ["uno", "ipopt"]
+    assert main(["solve", "--speed", "0.42", "--from-scratch"]) == 1
+    assert asked == [("neighbours", "uno"), ("neighbours", "ipopt"), ("scratch", "ipopt")]
 
 
 def test_the_reports_formulation_prints_residuals(monkeypatch, capsys):

@@ -17,6 +17,7 @@ from walk_optimizer.optimizer import Outcome, optimize
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.settings import SolverSettings
 from walk_optimizer.solve.status import ProgressCallback
+from walk_optimizer.warm_start import optimize_from
 
 _Result = TypeVar("_Result")
 
@@ -38,19 +39,31 @@ def watched(work: Callable[[ProgressCallback], _Result]) -> _Result:
 def solve(
     request: GaitRequest,
     walker: WalkerParameters,
+    library: GaitLibrary | None = None,
     time_limit: float | None = None,
     settings: SolverSettings | None = None,
 ) -> Outcome:
     """Return the outcome of a solve whose progress is shown on stderr.
 
+    Args:
+        request: What is asked for.
+        walker: The walker.
+        library: Whose gaits to start from, where they are neighbours; None for a search of its own.
+        time_limit: In [s]; the settings' by default.
+        settings: Of the search; the packaged ones by default.
+
     Raises:
         KeyboardInterrupt: Ctrl-C was pressed; the solve has ended.
     """
-    return watched(
-        lambda progress: optimize(
-            request, walker, settings=settings, time_limit=time_limit, progress=progress
+
+    def work(progress: ProgressCallback) -> Outcome:
+        if library is None:
+            return optimize(request, walker, settings=settings, time_limit=time_limit, progress=progress)
+        return optimize_from(
+            library, request, walker, settings=settings, time_limit=time_limit, progress=progress
         )
-    )
+
+    return watched(work)
 
 
 def chosen_gait(args: argparse.Namespace) -> Gait:
@@ -68,11 +81,12 @@ def chosen_gait(args: argparse.Namespace) -> Gait:
         raise InvalidRequestError("say which gait: --speed SPEED [--spring MODE], or --file GAIT")
     request = request_from(args)
     points = None if args.points is None else request.points
+    library = GaitLibrary(walker, args.library)
     try:
-        return GaitLibrary(walker, args.library).find(request.speed, request.spring_mode, points=points)[0]
+        return library.find(request.speed, request.spring_mode, points=points)[0]
     except GaitNotFoundError as error:
         print(f"{error}; solving {request_text(request)}", file=sys.stderr)
-    outcome = solve(request, walker)
+    outcome = solve(request, walker, library)
     if outcome.gait is None:
         raise SolveFailedError(f"no gait: {outcome.report.message}")
     return outcome.gait

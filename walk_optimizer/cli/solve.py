@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 _TEXT = """\
 solve for the gait of least torque at a speed
 
-Several first guesses are tried; the best optimum is solved with free contacts and
-checked by a certificate that is computed apart from the solver. A gait that fails its
+The search begins at the library's gaits of the next speeds, without them at several
+first guesses; the best optimum is solved with free contacts and checked by a
+certificate that is computed apart from the solver. A gait that fails its
 certificate is not a gait: the exit code is then 1 and nothing is stored."""
 
 _EPILOG = """\
@@ -56,6 +57,9 @@ def add_parser(verbs: Subparsers) -> None:
         choices=_FORMULATIONS,
         default=_FORMULATIONS[0],
         help="ours, or the report's own program, to see how far it gets (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--from-scratch", action="store_true", help="search without the library's gaits of other speeds"
     )
     parser.add_argument("--save", action="store_true", help="store the gait in the library")
     parser.add_argument("--export", type=Path, metavar="CSV", help="write the numbers to a file")
@@ -123,13 +127,14 @@ def run(args: argparse.Namespace) -> int:
     from walk_optimizer.library import GaitLibrary
 
     # Before the work, not after it: where the gait goes must be writable.
-    library = GaitLibrary(walker, args.library, writable=True) if args.save else None
+    library = GaitLibrary(walker, args.library, writable=args.save)
     if args.export:
         writable_target(args.export)
     print(request_text(request))
     if args.formulation == "report":
         return _try_report(request, walker, settings, time_limit)
-    outcome = solve(request, walker, time_limit, settings)
+    start_from = None if args.from_scratch else library
+    outcome = solve(request, walker, start_from, time_limit, settings)
     print(report_text(outcome.report))
     if outcome.gait is None:
         return 1
@@ -139,6 +144,6 @@ def run(args: argparse.Namespace) -> int:
     if args.export:
         write_csv(outcome.gait, args.export)
         print(f"\nexported to {args.export}")
-    if library is not None:
+    if args.save:
         print(f"\nstored as {library.store(outcome.gait)}")
     return 0
