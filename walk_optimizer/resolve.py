@@ -39,7 +39,7 @@ def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSess
     if not 1 <= len(neighbours) <= 2:
         raise InvalidRequestError(f"{len(neighbours)} neighbours given, expected one or two")
     refined = [_refined_of(gait) for gait in neighbours]
-    meshes = [_mesh_of(gait, one) for gait, one in zip(neighbours, refined, strict=True)]
+    meshes = [mesh_of(gait, one) for gait, one in zip(neighbours, refined, strict=True)]
     mesh = max(meshes, key=lambda one: one.intervals)
     guesses = [
         resampled(one.trajectory, one.spring, old, mesh) for one, old in zip(refined, meshes, strict=True)
@@ -63,7 +63,7 @@ def _refined_of(gait: Gait) -> RefinedGait:
     return gait.refined
 
 
-def _mesh_of(gait: Gait, refined: RefinedGait) -> Mesh:
+def mesh_of(gait: Gait, refined: RefinedGait) -> Mesh:
     """Return the mesh of a gait in single support.
 
     Raises:
