@@ -15,11 +15,11 @@ class Watcher(ca.Callback):
         """Watch nothing yet.
 
         Args:
-            expressions: x, p and g of the program.
+            expressions: x and g of the program.
             values: (x, p) -> (f, g), for a solver that tells its callback no more than x.
         """
         super().__init__()
-        self._sizes = tuple(expressions[name].numel() for name in ("x", "g", "p"))
+        self._sizes = {"x": expressions["x"].numel(), "g": expressions["g"].numel(), "f": 1}
         self._values = values
         self.monitor: Monitor | None = None
         self.problem: Problem | None = None
@@ -48,10 +48,9 @@ class Watcher(ca.Callback):
         return 1
 
     def get_sparsity_in(self, index: int) -> ca.Sparsity:
-        """Return the pattern of an input."""
-        n, m, parameters = self._sizes
-        size = {"x": n, "lam_x": n, "g": m, "lam_g": m, "f": 1, "p": parameters, "lam_p": parameters}
-        return ca.Sparsity.dense(size[ca.nlpsol_out(index)], 1)
+        """Return the pattern of an input; CasADi leaves empty ones out."""
+        size = self._sizes.get(ca.nlpsol_out(index))
+        return ca.Sparsity(0, 0) if size is None else ca.Sparsity.dense(size, 1)
 
     def eval(self, arguments: list[ca.DM]) -> list[int]:
         """Tell the monitor; return 1 to end the solve."""
