@@ -50,6 +50,7 @@ LAYERS = (
     ),
     ("description", "scene"),
     ("figures", "reproduction"),
+    ("simulation",),
     ("examples",),
     ("recording",),
     ("nodes", "cli"),
