@@ -1,6 +1,6 @@
-/* Fill-reducing elimination order of a symmetric matrix, as an assembly tree. */
-#ifndef WALK_OPTIMIZER_ORDERING_H
-#define WALK_OPTIMIZER_ORDERING_H
+/* A fill-reducing order of elimination of a symmetric matrix, as an assembly tree. */
+#ifndef WALK_OPTIMIZER_ASSEMBLY_TREE_H
+#define WALK_OPTIMIZER_ASSEMBLY_TREE_H
 
 /* Fronts of a multifrontal factorisation, children before parents.
  *

@@ -1,0 +1,116 @@
+/* Memory of an analysis and of its factors. */
+#include "factors.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+int reserve_doubles(Doubles *array, size_t count) {
+    if (array->used + count <= array->room) return 1;
+    size_t room = 2 * array->room + count;
+    double *data = realloc(array->data, room * sizeof *data);
+    if (data == NULL) return 0;
+    array->data = data;
+    array->room = room;
+    return 1;
+}
+
+int reserve_integers(Integers *array, size_t count) {
+    if (array->used + count <= array->room) return 1;
+    size_t room = 2 * array->room + count;
+    int *data = realloc(array->data, room * sizeof *data);
+    if (data == NULL) return 0;
+    array->data = data;
+    array->room = room;
+    return 1;
+}
+
+/* Give every entry of the matrix to the front that eliminates the first of its two unknowns. */
+static void assign_entries(Analysis *analysis, int n, const int *begin, const int *index) {
+    const AssemblyTree *tree = analysis->tree;
+    int *front_of = analysis->front_of, *at = analysis->entry_begin;
+    for (int f = 0; f < tree->front_count; f++)
+        for (int k = tree->pivot_begin[f]; k < tree->pivot_begin[f + 1]; k++) front_of[tree->pivots[k]] = f;
+    memset(at, 0, ((size_t)tree->front_count + 1) * sizeof(int));
+    for (int pass = 0; pass < 2; pass++) {
+        for (int j = 0; j < n; j++)
+            for (int k = begin[j]; k < begin[j + 1]; k++) {
+                int i = index[k], f = front_of[i] < front_of[j] ? front_of[i] : front_of[j];
+                if (pass == 0) {
+                    at[f + 1]++;
+                    continue;
+                }
+                int e = at[f]++;
+                analysis->entry[e] = k;
+                analysis->row[e] = i;
+                analysis->column[e] = j;
+            }
+        if (pass == 0)
+            for (int f = 0; f < tree->front_count; f++) at[f + 1] += at[f];
+    }
+    memmove(at + 1, at, (size_t)tree->front_count * sizeof(int));
+    at[0] = 0;
+}
+
+void free_analysis(Analysis *analysis) {
+    if (analysis == NULL) return;
+    free_assembly_tree(analysis->tree);
+    free(analysis->entry_begin), free(analysis->entry), free(analysis->row), free(analysis->column);
+    free(analysis->front_of);
+    free(analysis);
+}
+
+Analysis *analyse(int n, const int *begin, const int *index) {
+    Analysis *analysis = calloc(1, sizeof *analysis);
+    if (analysis == NULL) return NULL;
+    size_t entries = (size_t)begin[n] + 1;
+    analysis->entry_count = begin[n];
+    analysis->tree = order_by_minimum_degree(n, begin, index);
+    if (analysis->tree != NULL) {
+        analysis->entry_begin = malloc(((size_t)analysis->tree->front_count + 1) * sizeof(int));
+        analysis->entry = malloc(entries * sizeof(int));
+        analysis->row = malloc(entries * sizeof(int));
+        analysis->column = malloc(entries * sizeof(int));
+        analysis->front_of = malloc(((size_t)n + 1) * sizeof(int));
+        if (analysis->entry_begin != NULL && analysis->entry != NULL && analysis->row != NULL &&
+            analysis->column != NULL && analysis->front_of != NULL) {
+            assign_entries(analysis, n, begin, index);
+            return analysis;
+        }
+    }
+    free_analysis(analysis);
+    return NULL;
+}
+
+void free_factors(Factors *factors) {
+    if (factors == NULL) return;
+    free(factors->fronts), free(factors->values.data), free(factors->stack.data);
+    free(factors->indices.data), free(factors->waiting.data), free(factors->place);
+    free(factors->pivots), free(factors->places), free(factors->part), free(factors->scale), free(factors->largest);
+    free(factors);
+}
+
+void forget(const Analysis *analysis, Factors *factors) {
+    memcpy(factors->pivots, analysis->tree->pivots, (size_t)analysis->tree->n * sizeof(int));
+    for (int i = 0; i < analysis->tree->n; i++) factors->scale[i] = 1.0;
+}
+
+Factors *new_factors(const Analysis *analysis) {
+    const AssemblyTree *tree = analysis->tree;
+    Factors *factors = calloc(1, sizeof *factors);
+    if (factors == NULL) return NULL;
+    factors->fronts = malloc(((size_t)tree->front_count + 1) * sizeof(Front));
+    factors->place = malloc(((size_t)tree->n + 1) * sizeof(int));
+    factors->pivots = malloc(((size_t)tree->n + 1) * sizeof(int));
+    factors->places = malloc(((size_t)tree->n + 1) * sizeof(int));
+    factors->part = malloc(((size_t)tree->n + 1) * sizeof(double));
+    factors->scale = malloc(((size_t)tree->n + 1) * sizeof(double));
+    factors->largest = malloc(((size_t)tree->n + 1) * sizeof(double));
+    if (factors->fronts != NULL && factors->pivots != NULL && factors->place != NULL &&
+        factors->places != NULL && factors->part != NULL && factors->scale != NULL &&
+        factors->largest != NULL) {
+        forget(analysis, factors);
+        return factors;
+    }
+    free_factors(factors);
+    return NULL;
+}
