@@ -2,11 +2,13 @@
 
 Each entry is first searched for from scratch, the entries in parallel. Then every entry is continued
 from its neighbours in speed and from the mode with less freedom, until no entry improves: none is
-left that its neighbour leads to a better optimum of. At last each is refined.
+left that its neighbour leads to a better optimum of. At last each is refined, from all good optima that
+were met on the way.
 """
 
+import math
 import signal
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from itertools import product
@@ -24,6 +26,8 @@ from walk_optimizer.solve.settings import table_solver_settings
 Key = tuple[int, SpringMode]
 _MODES = tuple(SpringMode)
 _MAXIMUM_SWEEPS = 6
+# Optima of an entry that are worse by no more than this part are refined too.
+_GOOD = 0.05
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,7 @@ def build_table(
     processes: int = 2,
     points: int | None = None,
     modes: Iterable[SpringMode] = _MODES,
+    known: Sequence[Gait] = (),
     on_progress: Callable[[TableProgress], None] | None = None,
 ) -> dict[Key, Gait]:
     """Solve for all gaits of the table.
@@ -90,6 +95,7 @@ def build_table(
         processes: Solves that run at a time.
         points: Grid points of a step; the settings' by default.
         modes: Spring modes, each after the ones that it must not be worse than.
+        known: Gaits of a former table, which the new one is to be no worse than.
         on_progress: Told after each solve; what it raises ends the build, after the solves that run.
 
     Returns:
@@ -105,7 +111,7 @@ def build_table(
         processes, get_context("spawn"), initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
     )
     try:
-        return _Builder(walker, requests, pool, on_progress).build()
+        return _Builder(walker, requests, known, pool, on_progress).build()
     finally:
         pool.shutdown(cancel_futures=True)
 
@@ -117,14 +123,18 @@ class _Builder:
         self,
         walker: WalkerParameters,
         requests: dict[Key, GaitRequest],
+        known: Sequence[Gait],
         pool: ProcessPoolExecutor,
         on_progress: Callable[[TableProgress], None] | None,
     ) -> None:
         self.walker, self.requests, self.pool, self.on_progress = walker, requests, pool, on_progress
+        self.known = {gait.request: gait for gait in known}
         self.table: dict[Key, Gait] = {}
+        # All distinct optima of each entry, the table's among them.
+        self.found: dict[Key, list[Gait]] = {key: [] for key in requests}
 
     def build(self) -> dict[Key, Gait]:
-        improved = self._solve([self._job(key, (), from_scratch=True) for key in self.requests], "search")
+        improved = self._solve([self._search(key) for key in self.requests], "search")
         for _ in range(_MAXIMUM_SWEEPS):
             jobs = [self._continuation(key, improved) for key in self.requests]
             improved = self._solve([job for job in jobs if job.seeds], "continuation")
@@ -134,14 +144,30 @@ class _Builder:
         return self.table
 
     def _refine(self) -> None:
-        """Add the accurate solution to every entry."""
-        futures = {self.pool.submit(_refine, gait): key for key, gait in self.table.items()}
+        """Add the accurate solution to every entry: the best that any of its good optima leads to.
+
+        The grid's error is larger than the distance between them, so the best on the grid need not be the
+        best in truth.
+        """
+        futures = {self.pool.submit(_refine, gait): key for key in self.table for gait in self._good(key)}
         for done, future in enumerate(as_completed(futures), start=1):
             key, outcome = futures[future], future.result()
-            kept = outcome.gait is not None and outcome.gait.refined is not None
+            kept = outcome.gait is not None and self._refines_better(key, outcome.gait)
             if kept and outcome.gait is not None:
-                self.table[key] = outcome.gait
+                self.table[key] = replace(self.table[key], refined=outcome.gait.refined)
+                outcome = replace(outcome, gait=self.table[key])
             self._tell(TableProgress("refinement", done, len(futures), self.requests[key], outcome, kept))
+
+    def _good(self, key: Key) -> list[Gait]:
+        """Return the entry's optima that are not much worse than the best."""
+        largest = self.table[key].objective * (1 + _GOOD)
+        return [gait for gait in self.found[key] if gait.objective <= largest]
+
+    def _refines_better(self, key: Key, gait: Gait) -> bool:
+        known = self.table[key].refined
+        if gait.refined is None or known is None:
+            return gait.refined is not None
+        return gait.refined.trajectory.torque_effort < known.trajectory.torque_effort
 
     def _tell(self, progress: TableProgress) -> None:
         if self.on_progress is not None:
@@ -149,6 +175,11 @@ class _Builder:
 
     def _job(self, key: Key, seeds: tuple[Gait, ...], *, from_scratch: bool) -> _Job:
         return _Job(key, self.requests[key], self.walker, seeds, from_scratch)
+
+    def _search(self, key: Key) -> _Job:
+        """Return the job that searches for an entry from scratch, and from the gait of a former table."""
+        former = self.known.get(self.requests[key])
+        return self._job(key, () if former is None else (former,), from_scratch=True)
 
     def _continuation(self, key: Key, improved: set[Key]) -> _Job:
         """Return the job that continues an entry from those of its neighbours that have changed."""
@@ -165,11 +196,19 @@ class _Builder:
         for done, future in enumerate(as_completed(futures), start=1):
             job, outcome = futures[future], future.result()
             kept = outcome.gait is not None and self._is_better(job.key, outcome.gait)
+            if outcome.gait is not None:
+                self._note(job.key, outcome.gait)
             if kept and outcome.gait is not None:
                 self.table[job.key] = outcome.gait
                 improved.add(job.key)
             self._tell(TableProgress(stage, done, len(jobs), job.request, outcome, kept))
         return improved
+
+    def _note(self, key: Key, gait: Gait) -> None:
+        """Add an optimum to those of its entry, unless it is one of them."""
+        known = (one.objective for one in self.found[key])
+        if not any(math.isclose(gait.objective, one, rel_tol=SAME_OPTIMUM) for one in known):
+            self.found[key].append(gait)
 
     def _is_better(self, key: Key, gait: Gait) -> bool:
         known = self.table.get(key)

@@ -69,3 +69,11 @@ def test_the_bar_estimates_the_time_that_is_left():
         "[##########....................] 7/21 search, 1:10 min, about 2:20 min left of this stage"
     )
     assert (minutes(0.2), minutes(59.6), minutes(3599.9)) == ("0:00 min", "1:00 min", "60:00 min")
+
+
+def test_a_gait_that_was_refined_again_is_stored(tmp_path, solved):
+    again = replace(solved, trajectory=replace(solved.trajectory, u=solved.trajectory.u * (1 + 1e-12)))
+    assert again.refined is not None
+    assert store_better(solved, tmp_path)
+    assert store_better(again, tmp_path)
+    assert not store_better(replace(again, refined=None), tmp_path)

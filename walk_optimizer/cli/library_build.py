@@ -24,15 +24,18 @@ _TEXT = """\
 solve the table that ships with the package
 
 Every speed and spring mode is searched for from scratch, then continued from its
-neighbours until none improves. A gait is written as soon as it is certified and better
-than the one in the folder: an interrupted build keeps what it has found, and a further
-build never makes the table worse. Begin with an empty folder to start over."""
+neighbours until none improves, and refined. A gait is written as soon as it is
+certified and better than the one in the folder: an interrupted build keeps what it has
+found. A further build begins with the gaits that are there too, and never makes the
+table worse. Begin with an empty folder to start over."""
 
 _EPILOG = """\
 examples:
   walk-optimizer library build
   walk-optimizer library build --output my_table --walker my_walker.yaml"""
 
+# Two solves of one optimum differ by less, relative to F.
+_REPEATED = 1e-8
 _BAR = 30
 
 
@@ -54,15 +57,16 @@ def run(args: argparse.Namespace) -> int:
     points = None if args.points is None else parse_points(args.points)
 
     from walk_optimizer.gait_files.access import writable_folder
-    from walk_optimizer.library import table_folder
+    from walk_optimizer.library import GaitLibrary, table_folder
     from walk_optimizer.model.parameters import SpringMode
     from walk_optimizer.table_builder import build_table
 
     folder = args.output or table_folder()
     writable_folder(folder, create=args.output is None)
+    known = GaitLibrary(walker, folder).gaits()
     display = BuildDisplay(folder)
     with _children_end_on_interrupt():
-        gaits = build_table(walker, processes=jobs, points=points, on_progress=display)
+        gaits = build_table(walker, processes=jobs, points=points, known=known, on_progress=display)
     expected = gait_table_settings().gaits * len(SpringMode)
     print(f"{len(gaits)} of {expected} gaits solved in {minutes(display.elapsed)}; files in {folder}")
     return 0 if len(gaits) == expected else 1
@@ -95,9 +99,9 @@ class BuildDisplay:
 
 
 def store_better(gait: "Gait", folder: Path) -> bool:
-    """Write a gait, unless the folder holds a certified one of the same request that is as good.
+    """Write a gait, unless the folder holds a certified one of the same request that is better.
 
-    As good means no larger F, and a refinement if this one has it.
+    Better means a smaller F; of gaits with the same F the one is written that has just been refined.
     """
     from walk_optimizer.gait_files import gait_file_name, write_gait_file
     from walk_optimizer.verification import verify_file
@@ -105,8 +109,8 @@ def store_better(gait: "Gait", folder: Path) -> bool:
     path = folder / gait_file_name(gait)
     former = verify_file(path, gait.walker)
     if former.passed and former.gait is not None:
-        refined = former.gait.refined is not None or gait.refined is None
-        if former.gait.objective < gait.objective or (former.gait.objective == gait.objective and refined):
+        better = former.gait.objective < gait.objective * (1 - _REPEATED)
+        if better or (former.gait.objective <= gait.objective and gait.refined is None):
             return False
     write_gait_file(gait, path)
     return True
