@@ -70,11 +70,12 @@ class PhaseClock:
         """Whether the walk is held and no ramp is under way."""
         return self._motion is not Motion.RUNNING and self._progress == 0
 
-    def pause(self) -> None:
-        """Come to a hold over the ramp; an emergency stop stays what it is."""
+    def pause(self) -> Motion:
+        """Come to a hold over the ramp, and return what it is now: an emergency stop stays one."""
         with self._lock:
             if self._motion is Motion.RUNNING:
                 self._motion = Motion.PAUSED
+            return self._motion
 
     def resume(self) -> Motion:
         """Release an emergency stop into a pause, and a pause into the run; return what it is now.

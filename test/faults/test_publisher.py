@@ -106,6 +106,9 @@ def test_parameters_out_of_range_or_of_a_wrong_type_are_refused_by_name(graph, w
             assert not answer.successful, (setting.name, value)
             assert any(text in answer.reason for text in (setting.name, "read-only", "Wrong parameter type"))
         assert graph.get_parameter(NODE, setting.name) == before
+    topics = Parameter("recording_topics", value=["/diagnostics", "no name"])
+    (answer,) = graph.set_parameters(NODE, topics)
+    assert (answer.successful, "'no name' is no name of a topic" in answer.reason) == (False, True)
     go_on(walker)
 
 

@@ -19,6 +19,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from walk_optimizer_interfaces.msg import Gait, WalkState
 from walk_optimizer_interfaces.srv import GetJointTrajectory, SetGait, StartRecording, StopRecording
 
+from walk_optimizer.cli.processes import NodeProcess
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.qos import LATCHED
@@ -281,11 +282,31 @@ def test_parameters_are_validated_and_applied_while_running(graph, publisher):
 
 
 def test_a_bad_parameter_stops_the_start(start):
-    for name, value in (("rate", 5000.0), ("initial_speed", 40.0), ("spring_mode", "rubber")):
+    for name, value in (
+        ("rate", 5000.0),
+        ("initial_speed", 40.0),
+        ("spring_mode", "rubber"),
+        ("library_service", "no name"),
+        ("cache_folder", "/proc/nowhere"),
+    ):
         node = start("reference_publisher", **{name: value})
         assert node.process.wait(60) == 1
-        assert name in node.output()
+        assert name in node.output() or str(value) in node.output()
         assert "Traceback" not in node.output()
+
+
+def test_a_misspelt_parameter_is_told(graph, start):
+    node = start("reference_publisher", raet=100.0)
+    graph.spin_until(
+        lambda: "unknown parameter raet is ignored; did you mean rate?" in node.output(), "the warning"
+    )
+    assert_left_cleanly(node, node.stop())
+
+
+def test_arguments_that_ros_ignores_are_refused(tmp_path):
+    node = NodeProcess("reference_publisher", tmp_path / "log", ["--", "--rate", "500"])
+    assert node.process.wait(60) == 1
+    assert "can't start: unknown arguments --rate 500; parameters are given as --ros-args" in node.output()
 
 
 def test_a_simulated_clock_that_jumps_moves_no_reference(graph, start, stocked):

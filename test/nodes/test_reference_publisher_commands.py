@@ -121,7 +121,7 @@ def test_an_emergency_stop_is_latched(graph, walker, joints):
     assert not any(stopped.effort)
     refused = walker.set_gait(SLOW)
     assert (refused.success, "call ~/resume to release it" in refused.message) == (False, True)
-    walker.trigger("pause")
+    assert "emergency stop, holds its pose already" in walker.trigger("pause")
     assert "released, and paused" in walker.trigger("resume")
     walker.wait_for("paused")
     graph.spin_for(0.3)

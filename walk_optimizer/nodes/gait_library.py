@@ -16,7 +16,7 @@ from walk_optimizer.nodes.conversions import gait_from_message, gait_to_message,
 from walk_optimizer.nodes.diagnostics import Finding, Level
 from walk_optimizer.nodes.lifecycle import ManagedNode
 from walk_optimizer.nodes.log_text import with_fields
-from walk_optimizer.nodes.parameters import Setting
+from walk_optimizer.nodes.parameters import Setting, require_name
 from walk_optimizer.nodes.qos import LATCHED
 from walk_optimizer.nodes.running import run_node
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
@@ -48,6 +48,7 @@ SETTINGS = [
         "optimizer_service",
         "gait_optimizer/optimize_gait",
         "Service that is asked for gaits that the table lacks.",
+        check=require_name,
         read_only=True,
     ),
     Setting("optimizer_timeout", 900.0, "Longest wait for the optimizer's answer [s].", 1.0, 86_400.0),

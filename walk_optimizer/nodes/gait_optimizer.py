@@ -116,6 +116,8 @@ class GaitOptimizerNode(SuiteNode):
         await self.finished(ticket.future)
         outcome = outcome_of(ticket.future)
         self._health.note(outcome.report)
+        if outcome.report.status is Status.WORKER_LOST:
+            self.get_logger().warning(outcome.report.message)
         answer.report = report_to_message(outcome.report)
         if outcome.gait is None:
             raise SolveFailedError(f"{outcome.report.status.value}: {outcome.report.message}")

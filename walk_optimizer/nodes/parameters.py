@@ -1,5 +1,6 @@
 """Parameters with descriptions and ranges, validated when set, applied after it."""
 
+import difflib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,8 +12,11 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.exceptions import NameValidationException
+from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from walk_optimizer.errors import ConfigurationError, WalkOptimizerError
 
@@ -64,6 +68,20 @@ class Setting:
             self.check(value)
 
 
+def require_name(name: str) -> None:
+    """Refuse what is no name of a topic or service.
+
+    Raises:
+        ConfigurationError: says what is wrong with it.
+    """
+    try:
+        validate_full_topic_name(expand_topic_name(name, "node", "/"))
+    except (NameValidationException, ValueError, RuntimeError) as error:
+        # Without the name once more with a mark below, and without a place in rcl's sources.
+        reason = str(error).split("\n")[0].split(", at /")[0].rstrip(":")
+        raise ConfigurationError(f"{name!r} is no name of a topic or service: {reason}") from error
+
+
 class NodeParameters:
     """The parameters of a node: declared, validated together, applied once they are set."""
 
@@ -83,6 +101,7 @@ class NodeParameters:
         node.add_on_set_parameters_callback(self._validate)
         for setting in settings:
             node.declare_parameter(setting.name, setting.default, setting.descriptor())
+        self._tell_unknown()
 
     def __getitem__(self, name: str) -> Any:
         """Return the value of a parameter."""
@@ -93,6 +112,14 @@ class NodeParameters:
         self._node.add_post_set_parameters_callback(
             lambda parameters: apply({parameter.name for parameter in parameters})
         )
+
+    def _tell_unknown(self) -> None:
+        """Warn of values for parameters that there are not, which ROS ignores in silence."""
+        for name in self._node._parameter_overrides:  # noqa: SLF001  # rclpy tells nobody else
+            if not self._node.has_parameter(name):
+                similar = difflib.get_close_matches(name, self._settings, 1)
+                advice = f"did you mean {similar[0]}?" if similar else "`ros2 param list` names all"
+                self._node.get_logger().warning(f"unknown parameter {name} is ignored; {advice}")
 
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:

@@ -7,7 +7,7 @@ from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.joint_limits import JointLimits, limits_of
 from walk_optimizer.library import Selection
 from walk_optimizer.model.parameters import SpringMode
-from walk_optimizer.nodes.parameters import NodeParameters, Setting
+from walk_optimizer.nodes.parameters import NodeParameters, Setting, require_name
 from walk_optimizer.nodes.stream_messages import INTERFACES, TORQUES, StreamFormat
 from walk_optimizer.nodes.walker_setting import WALKER_FILE
 from walk_optimizer.recording import Compression, RecorderSettings
@@ -20,6 +20,11 @@ CERTIFIED, BLENDED = "certified", "blended"
 def _check_speed(speed: float) -> None:
     if speed != 0:
         GaitRequest.for_speed(speed)
+
+
+def _check_names(names: Sequence[str]) -> None:
+    for name in names:
+        require_name(name)
 
 
 def _order_of(names: Sequence[str]) -> Callable[[list[str]], None]:
@@ -141,6 +146,7 @@ SETTINGS = [
         "library_service",
         "gait_library/get_gait",
         "Service that gaits are taken from.",
+        check=require_name,
         read_only=True,
     ),
     Setting(
@@ -158,6 +164,7 @@ SETTINGS = [
             "/diagnostics",
         ],
         "Topics of other nodes that are recorded beside the publisher's own, as soon as they are there.",
+        check=_check_names,
     ),
     Setting("recording_folder", "", "Folder of new bags; empty for ~/.ros/walk_optimizer."),
     Setting(

@@ -44,11 +44,12 @@ class RecordingControl:
     def close(self) -> None:
         """Close the bag, if there is one."""
         if self._bag.recorder is not None:
-            status = self._end()
-            self._node.get_logger().info(f"closed {status.directory} with {status.messages} messages")
+            self._end()
 
     async def _start(self, request: StartRecording.Request, response: StartRecording.Response) -> None:
-        directory = self._record(Path(request.directory) if request.directory else None)
+        directory = self._record(
+            Path(request.directory).expanduser().absolute() if request.directory else None
+        )
         self._show(True)
         response.directory = str(directory)
         response.message = f"recording to {directory}"
@@ -75,7 +76,9 @@ class RecordingControl:
     def _end(self) -> RecorderStatus:
         """Close the bag and return what is in it."""
         self._forget_foreign()
-        return self._bag.stop()
+        status = self._bag.stop()
+        self._node.get_logger().info(f"closed {status.directory} with {status.messages} messages")
+        return status
 
     def _forget_foreign(self) -> None:
         if self._foreign is not None:

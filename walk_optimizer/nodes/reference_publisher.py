@@ -100,8 +100,10 @@ class ReferencePublisherNode(ManagedNode):
         self.get_logger().info(response.message)
 
     async def _pause(self, _request: Trigger.Request, response: Trigger.Response) -> None:
-        self._stream.walk.clock.pause()
-        response.message = "holds its pose; ~/resume lets it go on"
+        if self._stream.walk.clock.pause() is Motion.EMERGENCY_STOP:
+            response.message = "emergency stop, holds its pose already; ~/resume releases it into a pause"
+        else:
+            response.message = "holds its pose; ~/resume lets it go on"
 
     async def _resume(self, _request: Trigger.Request, response: Trigger.Response) -> None:
         goes_on = self._stream.walk.clock.resume() is Motion.RUNNING
@@ -129,11 +131,11 @@ class ReferencePublisherNode(ManagedNode):
         if gait is None:
             raise GaitNotFoundError("no gait is streamed yet; call set_gait first")
         rate = request.rate if request.rate != 0 else self.parameters["rate"]
+        cycle = sample_cycle(gait.profile, rate)
         response.trajectory = cycle_to_message(
-            sample_cycle(gait.profile, rate),
-            self.parameters["joint_names"],
-            self.parameters["trajectory_effort"],
+            cycle, self.parameters["joint_names"], self.parameters["trajectory_effort"]
         )
+        response.message = f"{gait}, two steps of it in {cycle.time.size} points"
 
     def _keep_limits_met(self, changes: list[Parameter]) -> SetParametersResult:
         """Refuse limits that what is walked now does not meet."""

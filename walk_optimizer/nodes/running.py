@@ -13,8 +13,9 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
 
-from walk_optimizer.errors import WalkOptimizerError
+from walk_optimizer.errors import ConfigurationError, WalkOptimizerError
 from walk_optimizer.nodes.suite_node import SuiteNode
 
 # How long the node still answers after it was told to stop, in [s].
@@ -25,6 +26,7 @@ def run_node(make: Callable[[], SuiteNode]) -> int:
     """Run a node until it is told to stop, and return the exit code: 1 where it can't start."""
     stop = _stop_on_signals()
     try:
+        _require_no_arguments()
         # rclpy's own handlers would take the context away before the bag is closed.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = make()
@@ -39,6 +41,20 @@ def run_node(make: Callable[[], SuiteNode]) -> int:
         node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _require_no_arguments() -> None:
+    """Refuse arguments that ROS takes no notice of.
+
+    Raises:
+        ConfigurationError: names them, and says how parameters are given.
+    """
+    unknown = remove_ros_args(sys.argv)[1:]
+    if unknown:
+        raise ConfigurationError(
+            f"unknown arguments {' '.join(unknown)}; parameters are given as --ros-args -p NAME:=VALUE, and "
+            "`ros2 param describe` tells of each while the node runs"
+        )
 
 
 def _refused(error: Exception) -> int:

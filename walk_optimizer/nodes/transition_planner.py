@@ -10,6 +10,7 @@ import numpy as np
 from walk_optimizer.blending import blended
 from walk_optimizer.errors import InvalidRequestError, SolveFailedError, WalkOptimizerError
 from walk_optimizer.gait import RefinedGait
+from walk_optimizer.gait_files.access import writable_folder
 from walk_optimizer.model.parameters import KneeSpring
 from walk_optimizer.nodes.publisher_settings import BLENDED
 from walk_optimizer.nodes.streamed_gait import Goal, pace_of_goal, profile_of_goal
@@ -45,8 +46,13 @@ class TransitionPlanner:
 
         Args:
             node: Whose parameters count, and whose executor waits.
+
+        Raises:
+            GaitFileError: the cache folder is missing, a symbolic link or not writable.
         """
         self._node = node
+        if node.parameters["cache_folder"]:
+            writable_folder(Path(node.parameters["cache_folder"]), create=False)
         self._known: OrderedDict[_Ends, tuple[RefinedGait, ...]] = OrderedDict()
         self._pool: WorkerPool | None = None
         self._ticket: Ticket | None = None
@@ -78,8 +84,9 @@ class TransitionPlanner:
         try:
             steps = await self._steps(begins, leads_to, torque_limit)
         except (InvalidRequestError, SolveFailedError, BusyError) as error:
+            within = f" within {torque_limit:g} N m" if np.isfinite(torque_limit) else ""
             raise NoTransitionError(
-                f"no certified steps from {_name(begins)} to {_name(leads_to)}: {error}; "
+                f"no certified steps from {_name(begins)} to {_name(leads_to)}{within}: {error}; "
                 "try a nearer speed, or set transitions to blended"
             ) from error
         return _plan(begins, leads_to, steps)
