@@ -21,7 +21,7 @@ def test_without_feedback_it_drifts_off_and_falls(loop):
 
 
 def test_it_recovers_from_a_push(loop):
-    walk = loop.walk(10, loop.push(5.0))
+    walk = loop.walk(10, loop.disturbance(push=5.0))
     assert walk.ending is Ending.LANDED
     back = np.abs([stride.next_state - loop.start for stride in walk.strides]).max(axis=1)
     pushed = loop.settings.disturbed_step - 1
@@ -30,7 +30,7 @@ def test_it_recovers_from_a_push(loop):
 
 
 def test_a_push_too_large_is_a_fall_with_its_reason(loop):
-    walk = loop.walk(10, loop.push(100.0))
+    walk = loop.walk(10, loop.disturbance(push=100.0))
     assert walk.ending.is_fall
     assert len(walk.completed) < 10
     assert walk.ending.sentence

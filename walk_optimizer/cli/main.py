@@ -25,6 +25,7 @@ _VERBS = (
     "transitions",
     "export",
     "picture",
+    "simulate",
     "reproduce",
     "example",
     "urdf",

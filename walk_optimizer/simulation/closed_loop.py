@@ -66,15 +66,16 @@ class ClosedLoop:
         simulator = self.simulator(FeedForward(self.reference))
         return walk(simulator, self.start, self.reference.step_length, steps)
 
-    def push(self, impulse: float) -> Disturbance:
-        """Return a push on the hip, forward positive, in [N s]."""
-        start = self.settings.push_phase * self.reference.step_time
-        push = Push(impulse, start, self.settings.push_duration)
-        return Disturbance(self.settings.disturbed_step, push=push)
+    def disturbance(self, push: float = 0.0, step_down: float = 0.0) -> Disturbance:
+        """Return what goes wrong in the step that the settings name.
 
-    def step_down(self, height: float) -> Disturbance:
-        """Return a step onto ground that lies lower by a height in [m]."""
-        return Disturbance(self.settings.disturbed_step, step_down=height)
+        Args:
+            push: On the hip, forward positive, in [N s].
+            step_down: The step leads down by so much, in [m].
+        """
+        start = self.settings.push_phase * self.reference.step_time
+        push_then = Push(push, start, self.settings.push_duration)
+        return Disturbance(self.settings.disturbed_step, push_then, step_down)
 
     def heavier(self, factor: float) -> "ClosedLoop":
         """Return the same feedback on a walker whose masses are so many times as large."""

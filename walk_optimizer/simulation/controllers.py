@@ -13,6 +13,9 @@ from walk_optimizer.simulation.reference import StepReference
 
 FloatArray = NDArray[np.float64]
 
+# Where the torques stand behind the states.
+_TORQUES = slice(STATE_WIDTH, STATE_WIDTH + 3)
+
 
 class Controller(Protocol):
     """What drives the walker."""
@@ -74,6 +77,17 @@ class PathFeedback:
         """Return the state less that of the gait where the hip is as far, (8,)."""
         return state - self._at(self.reference.model.hip(state)[0])[0]
 
+    def linearized(self, progress: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return x* (8,), u* (3,) and the derivative of the law by the state there, (3, 8).
+
+        du/dx = du*/ds h' + K (I - dx*/ds h'), h being the derivative of s by the state.
+        """
+        state, torque, gain = self._at(progress)
+        slopes = self._law(progress, 1)
+        along = self.reference.model.hip_gradient(state)
+        across = np.eye(STATE_WIDTH) - np.outer(slopes[:STATE_WIDTH], along)
+        return state, torque, np.outer(slopes[_TORQUES], along) + gain @ across
+
     def _at(self, progress: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return x*, u* and K at s in [m]; beyond the ends of the step the path runs on straight."""
         ends, slopes = self.reference.progress, self.reference.path_slopes[0]
@@ -82,4 +96,4 @@ class PathFeedback:
         state = values[:STATE_WIDTH]
         if inside != progress:
             state = state + slopes[0 if progress < inside else -1] * (progress - inside)
-        return state, values[STATE_WIDTH : STATE_WIDTH + 3], values[STATE_WIDTH + 3 :].reshape(3, STATE_WIDTH)
+        return state, values[_TORQUES], values[_TORQUES.stop :].reshape(3, STATE_WIDTH)

@@ -1,18 +1,21 @@
 """Small deviations from a gait, within a step and over its touch-down."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
+from walk_optimizer.simulation.controllers import PathFeedback
 from walk_optimizer.simulation.pinned_walker import STATE_WIDTH
 from walk_optimizer.simulation.reference import StepReference
 
 FloatArray = NDArray[np.float64]
 
-_TOLERANCES = {"rtol": 1e-8, "atol": 1e-10}
+_TOLERANCES = {"rtol": 1e-8, "atol": 1e-8}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,27 +92,16 @@ class LinearizedStep:
         normal: FloatArray = self.reference.model.walker.terrain.along_and_normal(rows)[1]
         return normal
 
-    def transition(self, matrices: FloatArray) -> FloatArray:
-        """Return what becomes of deviations within the step under d' = A d, (8, 8).
-
-        Args:
-            matrices: A at each place, (PLACES, 8, 8).
-        """
+    def _transition(self, matrix: Callable[[float], FloatArray]) -> FloatArray:
+        """Return what becomes of deviations within the step under d' = A(t) d, (8, 8)."""
 
         def rate(time: float, flat: FloatArray) -> FloatArray:
-            return (self.between(matrices, time) @ flat.reshape(STATE_WIDTH, -1)).ravel()
+            change: FloatArray = matrix(time) @ flat.reshape(STATE_WIDTH, STATE_WIDTH)
+            return change.ravel()
 
         start, span = np.eye(STATE_WIDTH).ravel(), (0.0, self.reference.step_time)
         end: FloatArray = solve_ivp(rate, span, start, method="DOP853", **_TOLERANCES).y[:, -1]
         return end.reshape(STATE_WIDTH, STATE_WIDTH)
-
-    def between(self, matrices: FloatArray, time: float) -> FloatArray:
-        """Return matrices given at each place at a time in [s], linear between the places."""
-        place = time / self.reference.step_time * (len(matrices) - 1)
-        index = min(int(place), len(matrices) - 2)
-        weight = place - index
-        value: FloatArray = (1 - weight) * matrices[index] + weight * matrices[index + 1]
-        return value
 
     @cached_property
     def landing_speed(self) -> float:
@@ -119,16 +111,26 @@ class LinearizedStep:
     @cached_property
     def open_loop(self) -> FloatArray:
         """Monodromy matrix under the gait's torques against time, which begin anew at touch-down, (8, 8)."""
-        return self.jump @ self.transition(self.timed)
+        reference = self.reference
+        path = CubicSpline(reference.time, np.hstack([reference.states, reference.torques]))
 
-    def closed_loop(self, gains: FloatArray) -> FloatArray:
-        """Return the monodromy matrix under feedback (8, 8): G times the transition under A + B K.
+        def matrix(time: float) -> FloatArray:
+            values = path(time)
+            return reference.model.linearized(values[:STATE_WIDTH], values[STATE_WIDTH:])[0]
 
-        Args:
-            gains: K at each place, (PLACES, 3, 8).
-        """
-        held: FloatArray = self.jump @ self.transition(self.following + self.input @ gains)
-        return held
+        return self.jump @ self._transition(matrix)
+
+    def closed_loop(self, feedback: PathFeedback) -> FloatArray:
+        """Return the monodromy matrix under feedback, (8, 8)."""
+        reference = self.reference
+        progress = CubicSpline(reference.time, reference.progress)
+
+        def matrix(time: float) -> FloatArray:
+            state, torque, gradient = feedback.linearized(float(progress(time)))
+            by_state, by_torque = reference.model.linearized(state, torque)
+            return by_state + by_torque @ gradient
+
+        return self.jump @ self._transition(matrix)
 
 
 def largest_multiplier(monodromy: FloatArray) -> float:

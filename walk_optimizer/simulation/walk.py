@@ -18,13 +18,13 @@ class Disturbance:
 
     Attributes:
         step: The step, counted from 1.
-        push: A push in that step, if any.
+        push: A push in that step.
         step_down: The ground under the foot that ends that step lies lower by so much, in [m].
     """
 
     step: int
-    push: Push | None = None
-    step_down: float = 0.0
+    push: Push
+    step_down: float
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,35 @@
+"""`walk-optimizer simulate` in processes of its own."""
+
+import pytest
+from cli.console import walk_optimizer
+
+GAIT = ("--speed", "1.5km/h", "--spring", "stiffness_and_equilibrium")
+
+
+def test_it_says_how_the_walk_went_and_draws_it(tmp_path):
+    picture = tmp_path / "walk.png"
+    done = walk_optimizer(
+        "simulate", *GAIT, "--steps", "3", "--push", "2", "--picture", picture, home=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert "3 of 3, still walking" in done.stdout
+    assert "eigenvalue" in done.stdout
+    assert picture.stat().st_size > 10_000
+
+
+def test_a_fall_is_told_with_its_step_and_reason(tmp_path):
+    done = walk_optimizer("simulate", *GAIT, "--push", "90", home=tmp_path)
+    assert done.returncode == 1
+    assert "fell in step " in done.stdout
+    assert "foot" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "named"),
+    [("--steps", "0", "steps"), ("--push", "nan", "push"), ("--heavier", "-100", "heavier")],
+)
+def test_impossible_numbers_are_refused(option, value, named, tmp_path):
+    done = walk_optimizer("simulate", *GAIT, option, value, home=tmp_path)
+    assert done.returncode == 2
+    assert named in done.stderr
+    assert len(done.stderr.splitlines()) == 1

@@ -1,0 +1,169 @@
+"""`simulate`: a gait in closed loop over many steps."""
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from walk_optimizer.cli.arguments import Subparsers, add_gait_choice, add_verb
+from walk_optimizer.errors import InvalidRequestError
+
+if TYPE_CHECKING:
+    from walk_optimizer.gait import Gait
+    from walk_optimizer.simulation.closed_loop import ClosedLoop
+    from walk_optimizer.simulation.walk import Disturbance, SimulatedWalk
+
+_MOST_STEPS = 1000
+
+_TEXT = """\
+walk a gait in closed loop, step after step
+
+The walker is integrated apart from the optimiser, with knee stops, touch-downs and the
+limits of friction. A linear-quadratic regulator holds it on the gait. The exit code is 1
+when it falls."""
+
+_EPILOG = """\
+examples:
+  walk-optimizer simulate --speed 1.5km/h --spring stiffness_and_equilibrium
+  walk-optimizer simulate --speed 1.5km/h --spring stiffness_and_equilibrium --push 5
+        a push forward on the hip, in N s, in the third step
+  walk-optimizer simulate --speed 1.5km/h --spring stiffness --step-down 0.005 --picture walk.png
+  walk-optimizer simulate --table
+        all gaits of the table with all disturbances; takes a quarter of an hour"""
+
+
+def add_parser(verbs: Subparsers) -> None:
+    """Add the verb."""
+    parser = add_verb(verbs, "simulate", _TEXT, _EPILOG)
+    add_gait_choice(parser)
+    parser.add_argument("--steps", metavar="N", help="steps to walk (default: 20)")
+    parser.add_argument(
+        "--push", default="0", metavar="N_S", help="push on the hip in N s, forward positive (default: none)"
+    )
+    parser.add_argument(
+        "--step-down", default="0", metavar="M", help="one step leads down by so much in m (default: 0)"
+    )
+    parser.add_argument(
+        "--heavier",
+        default="0",
+        metavar="PERCENT",
+        help="masses are larger than the feedback knows (default: 0)",
+    )
+    parser.add_argument(
+        "--without-feedback", action="store_true", help="play the gait's torques back and nothing else"
+    )
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the walk: png, pdf, svg")
+    parser.add_argument("--table", action="store_true", help="all gaits of the table, as Markdown")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Walk, and say how it went."""
+    if args.table:
+        return _print_table(args)
+    steps = _steps(args.steps)
+    push, down = _number(args.push, "push", "N s"), _number(args.step_down, "step down", "m")
+    heavier = _number(args.heavier, "heavier", "%")
+    if heavier <= -100:
+        raise InvalidRequestError(f"heavier is {heavier:g} %, allowed is more than -100")
+
+    from walk_optimizer.cli.gaits import chosen_gait
+    from walk_optimizer.figures import picture_target
+    from walk_optimizer.simulation.closed_loop import closed_loop
+    from walk_optimizer.simulation.settings import simulation_settings
+
+    if args.picture is not None:
+        picture_target(args.picture)
+    gait = chosen_gait(args)
+    loop = closed_loop(gait, simulation_settings()).heavier(1 + heavier / 100)
+    disturbance = loop.disturbance(push, down)
+    walk = loop.walk_without_feedback(steps) if args.without_feedback else loop.walk(steps, disturbance)
+    print(_text(gait, loop, walk, steps))
+    if args.picture is not None:
+        _draw(gait, loop, walk, disturbance, args.picture)
+    return 1 if walk.ending.is_fall else 0
+
+
+def _draw(
+    gait: "Gait", loop: "ClosedLoop", walk: "SimulatedWalk", disturbance: "Disturbance", path: Path
+) -> None:
+    from walk_optimizer.simulation.picture import walk_picture
+
+    walk_picture(gait, loop, walk, disturbance, path)
+    print(f"picture in {path}")
+
+
+def _text(gait: "Gait", loop: "ClosedLoop", walk: "SimulatedWalk", steps: int) -> str:
+    """Return how a walk went, one line a fact."""
+    from walk_optimizer.cli.text import number, speed_text
+    from walk_optimizer.simulation.linearization import largest_multiplier
+
+    done, reference = len(walk.completed), loop.reference
+    ended = f"fell in step {done + 1}: {walk.ending.sentence}" if walk.ending.is_fall else "still walking"
+    held = largest_multiplier(loop.step.closed_loop(loop.feedback))
+    alone = largest_multiplier(loop.step.open_loop)
+    effort = f"{number(walk.mean_effort, '.4g')} (N m)^2 s a step, the gait's {reference.torque_effort:.4g}"
+    speed = speed_text(walk.mean_speed) if done else "-"
+    return "\n".join(
+        [
+            f"gait           {speed_text(gait.speed)}, springs {gait.request.spring_mode.value}",
+            f"steps          {done} of {steps}, {ended}",
+            f"mean speed     {speed}",
+            f"torque effort  {effort}",
+            f"peak torque    {walk.peak_torque:.1f} N m",
+            f"deviation      at most {loop.largest_deviation(walk):.2g} rad from the gait",
+            f"eigenvalue     {held:.2f} a step with feedback, {alone:.3g} without",
+        ]
+    )
+
+
+def _print_table(args: argparse.Namespace) -> int:
+    """Print the table row by row."""
+    from walk_optimizer.cli.arguments import walker_from
+    from walk_optimizer.library import GaitLibrary
+    from walk_optimizer.simulation.settings import simulation_settings
+    from walk_optimizer.simulation.table import HEADINGS, table_rows
+
+    library = GaitLibrary(walker_from(args), args.library)
+    print(_markdown(HEADINGS), _markdown(["---"] * len(HEADINGS)), sep="\n")
+    for row in table_rows(library, simulation_settings()):
+        print(_markdown(row), flush=True)
+    return 0
+
+
+def _markdown(cells: "tuple[str, ...] | list[str]") -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _steps(text: str | None) -> int:
+    """Return a number of steps.
+
+    Raises:
+        InvalidRequestError: it is no whole number within bounds.
+    """
+    from walk_optimizer.simulation.settings import simulation_settings
+
+    if text is None:
+        return simulation_settings().steps
+    try:
+        steps = int(text)
+    except ValueError:
+        steps = 0
+    if not 1 <= steps <= _MOST_STEPS:
+        raise InvalidRequestError(f"steps is {text!r}, allowed are whole numbers from 1 to {_MOST_STEPS}")
+    return steps
+
+
+def _number(text: str, name: str, unit: str) -> float:
+    """Return a finite number.
+
+    Raises:
+        InvalidRequestError: it is none.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InvalidRequestError(f"{name} is {text!r}, allowed are finite numbers, in {unit}")
+    return value
