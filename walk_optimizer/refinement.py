@@ -158,13 +158,9 @@ class RefinedSolves:
         """
         refined = RefinedProblem(self.request, self.walker, mesh)
         unit = torque_unit(self.walker) ** 2 / self.request.interval
+        options = replace(self.session.options, barrier=barrier, maximum_iterations=_MOST_ITERATIONS)
         solution = self.session.solve(
-            refined.problem(),
-            refined.pack(points),
-            "refinement",
-            objective_unit=unit,
-            barrier=barrier,
-            maximum_iterations=_MOST_ITERATIONS,
+            refined.problem(), refined.pack(points), "refinement", objective_unit=unit, options=options
         )
         if not solution.solved:
             return RefinedSolution(solution.status, mesh, None, points.spring)

@@ -12,6 +12,7 @@ from walk_optimizer.gait import Gait
 from walk_optimizer.guess import Start, kinematic_guess, resampled
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.solve.back_end import SolveOptions
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription import layout
@@ -109,7 +110,7 @@ class Search:
         request = replace(self.request, points=points)
         guess = kinematic_guess(self.walker, request, start.shape)
         candidate = Candidate(start.name, "single-impact", guess, start.spring, Status.SOLVED)
-        return self.with_family(candidate, "single-impact", points, "search", barrier=None)
+        return self.with_family(candidate, "single-impact", points, "search", self.session.options)
 
     def from_gait(self, gait: Gait) -> list[Candidate]:
         """Return the optima that continue a gait of another request, also with its own contacts."""
@@ -122,7 +123,7 @@ class Search:
             schedules[OWN_CONTACTS] = own
         guesses = ((replace(seed, contacts=contacts), one) for contacts, one in schedules.items())
         return [
-            self._with_schedule(*guess, "continuation", barrier=_RESAMPLED)
+            self._with_schedule(*guess, "continuation", self._from_barrier(_RESAMPLED))
             for guess in guesses
             if not self.session.stopped
         ]
@@ -133,8 +134,7 @@ class Search:
         contacts: str,
         points: int,
         stage: str,
-        *,
-        barrier: float | None = _RESAMPLED,
+        options: SolveOptions | None = None,
     ) -> Candidate:
         """Return the candidate solved on `points` grid points with a contact family.
 
@@ -143,10 +143,14 @@ class Search:
             contacts: Name of the contact family.
             points: Number of grid points.
             stage: Name for the progress.
-            barrier: First barrier parameter; None for a start that may be far from any optimum.
+            options: By default those for an optimum of another grid.
         """
         guess = replace(candidate, contacts=contacts, points=resampled(candidate.points, points))
-        return self._with_schedule(guess, CONTACT_FAMILIES[contacts](points), stage, barrier=barrier)
+        options = options or self._from_barrier(_RESAMPLED)
+        return self._with_schedule(guess, CONTACT_FAMILIES[contacts](points), stage, options)
+
+    def _from_barrier(self, barrier: float) -> SolveOptions:
+        return replace(self.session.options, barrier=barrier)
 
     def with_free_contacts(self, best: Candidate, rounds: int, iterations: int) -> Candidate:
         """Return the optimum with the contacts that complementarity finds; `best` if those are no better.
@@ -167,19 +171,18 @@ class Search:
             if found is None or found.mean_effort >= best.mean_effort * (1 - SAME_OPTIMUM):
                 break
             best = found
-        return replace(best, points=with_slip_speeds(self.walker, best.points))
+        return best
 
     def _with_other_contacts(self, best: Candidate, iterations: int) -> Candidate | None:
         """Return the optimum of the contacts that the relaxed problem moves to; None if it stays."""
-        start = replace(best, points=with_slip_speeds(self.walker, best.points))
         problem = complementarity_problem(self.request, self.walker, self.relaxation)
-        relaxed = self._solve(problem, start, "complementarity", barrier=_NEAR, maximum_iterations=iterations)
+        options = replace(self._from_barrier(_NEAR), maximum_iterations=iterations)
+        relaxed = self._solve(problem, best, "complementarity", options)
         schedule = self._schedule(relaxed)
         if self.session.stopped or np.array_equal(schedule, self._schedule(best)):
             return None
-        found = self._with_schedule(
-            replace(relaxed, contacts=OWN_CONTACTS), schedule, "polish", barrier=_NEAR
-        )
+        guess = replace(relaxed, contacts=OWN_CONTACTS)
+        found = self._with_schedule(guess, schedule, "polish", self._from_barrier(_NEAR))
         return found if found.solved else None
 
     def _schedule(self, candidate: Candidate) -> Schedule:
@@ -188,32 +191,17 @@ class Search:
         return schedule_of(self.walker, self.request.step_length, *parts)
 
     def _with_schedule(
-        self, guess: Candidate, schedule: Schedule, stage: str, *, barrier: float | None = None
+        self, guess: Candidate, schedule: Schedule, stage: str, options: SolveOptions
     ) -> Candidate:
         request = replace(self.request, points=schedule.shape[1])
         problem = fixed_schedule_problem(request, self.walker, schedule)
-        solved = self._solve(problem, guess, stage, barrier=barrier)
+        solved = self._solve(problem, guess, stage, options)
         return replace(solved, points=with_slip_speeds(self.walker, solved.points))
 
-    def _solve(
-        self,
-        problem: Problem,
-        guess: Candidate,
-        stage: str,
-        *,
-        barrier: float | None,
-        maximum_iterations: int | None = None,
-    ) -> Candidate:
+    def _solve(self, problem: Problem, guess: Candidate, stage: str, options: SolveOptions) -> Candidate:
         # The scaled objective is the integral of 1/2 |u|^2, F its sum over the grid points.
         unit = torque_unit(self.walker) ** 2 * guess.points.shape[1] / self.request.step_time
         start = to_scaled(self.walker, guess.points, guess.spring)
-        solution = self.session.solve(
-            problem,
-            start,
-            stage,
-            objective_unit=unit,
-            barrier=barrier,
-            maximum_iterations=maximum_iterations,
-        )
+        solution = self.session.solve(problem, start, stage, objective_unit=unit, options=options)
         points, spring = from_scaled(self.walker, solution.x)
         return replace(guess, points=points, spring=spring, status=solution.status, detail=solution.detail)

@@ -5,7 +5,7 @@ the solver learns where a contact helps; the bound then falls to nothing, and so
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.solution import FloatArray
@@ -58,7 +58,8 @@ def follow_relaxation(
     for relaxation in relaxations:
         problem = problem_at(relaxation)
         stage = f"products below {relaxation:.0e}"
-        solution = session.solve(problem, x, stage, objective_unit=objective_unit, barrier=barrier)
+        options = replace(session.options, barrier=barrier)
+        solution = session.solve(problem, x, stage, objective_unit=objective_unit, options=options)
         solves.append(RelaxedSolve(relaxation, solution.status, solution.iterations, solution.objective))
         x, barrier = solution.x, min(_BARRIER_PART * relaxation, _LARGEST_BARRIER)
     return x, tuple(solves)

@@ -41,6 +41,11 @@ class SolveSession:
         self._last: Progress | None = None
 
     @property
+    def options(self) -> SolveOptions:
+        """Options of a solve from a start that may be far from a solution."""
+        return SolveOptions(self._settings.tolerance, self._settings.maximum_iterations)
+
+    @property
     def elapsed(self) -> float:
         """Time since the session began in [s]."""
         return time.monotonic() - self._begin
@@ -57,8 +62,6 @@ class SolveSession:
         stage: str,
         *,
         objective_unit: float,
-        barrier: float | None = None,
-        maximum_iterations: int | None = None,
         options: SolveOptions | None = None,
     ) -> Solution:
         """Solve one program of the session.
@@ -68,18 +71,13 @@ class SolveSession:
             start: First iterate.
             stage: Name for the progress.
             objective_unit: What one unit of the scaled objective is, in [(N m)^2].
-            barrier: First barrier parameter for a start that is close to a solution.
-            maximum_iterations: By default the settings'.
-            options: Of the back end, in place of the settings, the barrier and the limit.
+            options: Of the back end; by default those of the session.
         """
 
         def monitor(state: IterationState) -> Status | None:
             return self._watch(state, stage, objective_unit)
 
-        if options is None:
-            limit = maximum_iterations or self._settings.maximum_iterations
-            options = SolveOptions(self._settings.tolerance, limit, barrier)
-        solution = self._back_end.solve(problem, start, options, monitor)
+        solution = self._back_end.solve(problem, start, options or self.options, monitor)
         self.iterations += solution.iterations
         return solution
 

@@ -1,6 +1,6 @@
 """Solves for the steps from one pace to another: first guess, adapted mesh, certificate."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -169,8 +169,9 @@ class _Solve:
             self.limits,
         )
         unit = torque_unit(self.walker) ** 2
+        options = replace(self.session.options, barrier=barrier)
         solution = self.session.solve(
-            problem.problem(), problem.pack(points), "transition", objective_unit=unit, barrier=barrier
+            problem.problem(), problem.pack(points), "transition", objective_unit=unit, options=options
         )
         return solution.status, problem.unpack(solution.x)
 
