@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
 from nodes.conftest import FAST, SLOW
 from nodes.graph import SETTLING, assert_left_cleanly
 from rclpy.parameter import Parameter
@@ -293,6 +294,18 @@ def test_a_bad_parameter_stops_the_start(start):
         assert node.process.wait(60) == 1
         assert name in node.output() or str(value) in node.output()
         assert "Traceback" not in node.output()
+
+
+def test_operators_are_told_why_nothing_is_streamed(graph, start):
+    start("reference_publisher", use_sim_time=True)
+    heard = graph.subscribe(DiagnosticArray, "/diagnostics")
+
+    def told(words):
+        return any(words in one.message for array in heard for one in array.status)
+
+    graph.spin_until(lambda: told("the clock stands still, start what publishes /clock"), "the clock")
+    graph.set_parameters(NODE, Parameter("streaming", value=False))
+    graph.spin_until(lambda: told("nothing is streamed: the parameter `streaming` is false"), "the parameter")
 
 
 def test_a_misspelt_parameter_is_told(graph, start):

@@ -1,5 +1,7 @@
 """The stream of references: each tick of the clock becomes the messages of that instant."""
 
+import time
+
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -63,6 +65,16 @@ class JointStream:
         return self._report
 
     @property
+    def running(self) -> bool:
+        """Whether references are to be published."""
+        return self._running
+
+    @property
+    def silence(self) -> float:
+        """Time since the last reference in [s] of the wall clock."""
+        return time.monotonic() - self._published
+
+    @property
     def missed(self) -> int:
         """Ticks that came too late and were dropped, since `start`."""
         return self._pacer.missed if self._pacer is not None else 0
@@ -84,6 +96,7 @@ class JointStream:
         self._report = None
         self._begin_ns = self._node.get_clock().now().nanoseconds
         self._last_ns = -1
+        self._published = time.monotonic()
         self._pacer = Pacer(1 / rate, self._tick)
 
     def stop(self) -> None:
@@ -147,6 +160,7 @@ class JointStream:
         self._torques.publish(messages.torques(reference), now.nanoseconds)
         self._commands.publish(messages.commands(reference), now.nanoseconds)
         self._announce(now)
+        self._published = time.monotonic()
 
     def _announce(self, now: Time) -> None:
         """Publish what is latched where that has changed."""

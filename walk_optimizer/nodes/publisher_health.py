@@ -11,6 +11,8 @@ from walk_optimizer.recording.status import RecorderStatus
 _CHECKS = ("walk", "timing", "recording")
 _MILLISECONDS = 1e3
 _MEGABYTE = 1e6
+# A stream of 1 Hz is the slowest, in [s].
+_LONG_SILENCE = 2.0
 
 
 class PublisherHealth:
@@ -51,6 +53,14 @@ class PublisherHealth:
             for kind, value in zip(("median", "99_percent", "max"), three, strict=True):
                 values[f"{name}_{kind}_ms"] = value * _MILLISECONDS
         values |= {"missed_last_second": punctuality.missed, "missed": self._stream.missed}
+        if not self._stream.running:
+            return Finding(Level.WARN, "nothing is streamed: the parameter `streaming` is false", values)
+        if self._stream.silence > _LONG_SILENCE:
+            text = (
+                f"no reference for {self._stream.silence:.1f} s: the clock stands still, start what "
+                "publishes /clock or set `use_sim_time` to false; or see `reference lost` in the log"
+            )
+            return Finding(Level.WARN, text, values)
         if punctuality.missed:
             text = (
                 f"{punctuality.missed} references of the last second were missed: lower `rate`, or give the "
