@@ -83,7 +83,7 @@ class RefinedTrajectory:
 
     def locate(self, time: float) -> tuple[int, float]:
         """Return the interval of a time in [s] and the place in it, in [0, 1]."""
-        index = int(np.clip(self.breaks.searchsorted(time, side="left") - 1, 0, self.intervals - 1))
+        index = min(max(int(self.breaks.searchsorted(time, side="left")) - 1, 0), self.intervals - 1)
         return index, (time - self.breaks[index]) / float(self.lengths[index])
 
     def state(self, index: int, place: float) -> FloatArray:
