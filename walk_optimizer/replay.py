@@ -4,6 +4,7 @@ The motion between impacts is integrated as an ordinary differential equation of
 the ground reactions that hold the feet under load solved for at every instant.
 """
 
+from collections.abc import Callable
 from functools import cache
 
 import casadi as ca
@@ -16,6 +17,7 @@ from walk_optimizer.model import dynamics, ground
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.transcription.compilation import compiled
 from walk_optimizer.transcription.phases import Modes
 
 FloatArray = NDArray[np.float64]
@@ -28,7 +30,6 @@ _ANY_TREAD = 1.0
 HELD_SPEED = 1e-6
 
 
-@cache
 def _rate_function(modes: Modes) -> ca.Function:
     """Return (state, u, spring, walker) -> rate of the state (12,) with the feet that carry load held.
 
@@ -69,9 +70,14 @@ def _held(walker: SymbolicWalker, q: ca.SX, leg: int, mode: FootMode) -> tuple[c
 
 
 @cache
+def _builder(modes: Modes) -> Callable[[], list[ca.Function]]:
+    return lambda: [_rate_function(modes)]
+
+
+@cache
 def _rates(modes: Modes, count: int) -> ca.Function:
-    """Return `_rate_function` for as many states at once, in columns."""
-    return _rate_function(modes).map(count)
+    """Return `_rate_function`, compiled, for as many states at once, in columns."""
+    return compiled(_builder(modes))["rate"].map(count)
 
 
 def _replayed(
