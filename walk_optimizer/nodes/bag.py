@@ -82,6 +82,11 @@ class StreamBag:
         self.recorder = recorder
         return recorder
 
+    def rest(self) -> None:
+        """Say that nothing is published for a moment."""
+        if self.recorder is not None:
+            self.recorder.rest()
+
     def stop(self) -> RecorderStatus:
         """Close the bag and return what is in it.
 

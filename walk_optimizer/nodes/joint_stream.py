@@ -36,7 +36,7 @@ class JointStream:
             node: That publishes.
             bag: That records what is published.
         """
-        self._node = node
+        self._node, self._bag = node, bag
         self._joints = RecordedTopic(node, JointState, "~/joint_reference", STREAM, bag)
         self._torques = RecordedTopic(node, Float64MultiArray, "~/feedforward_torques", STREAM, bag)
         self._commands = RecordedTopic(node, Float64MultiArray, "~/commands", STREAM, bag)
@@ -161,6 +161,7 @@ class JointStream:
         self._commands.publish(messages.commands(reference), now.nanoseconds)
         self._announce(now)
         self._published = time.monotonic()
+        self._bag.rest()
 
     def _announce(self, now: Time) -> None:
         """Publish what is latched where that has changed."""

@@ -9,8 +9,9 @@ Item = TypeVar("Item")
 class Inbox(Generic[Item]):
     """Takes items without ever waiting, and hands them over in whole batches.
 
-    The lock is held for a few instructions only, whatever the disk does, and the taker, whom no item wakes,
-    empties the queue in one exchange: so a caller with a period of 1 ms does not notice it.
+    The lock is held for a few instructions only, whatever the disk does, and the taker empties the queue in
+    one exchange. No item wakes it, but callers with a period say when they rest: so one of 1 ms does not
+    notice it.
     """
 
     def __init__(self, limit: int) -> None:
@@ -23,6 +24,7 @@ class Inbox(Generic[Item]):
         self._items: list[Item] = []
         self._rejected = 0
         self._closed = threading.Event()
+        self._resting = threading.Event()
         self._lock = threading.Lock()
 
     @property
@@ -63,17 +65,25 @@ class Inbox(Generic[Item]):
                 self._items.append(item)
             return not self.closed
 
-    def take(self, patience: float) -> tuple[list[Item], bool]:
-        """Let items gather, and take all of them.
+    def rest(self) -> None:
+        """Say that no items are offered for a moment."""
+        self._resting.set()
+
+    def take(self, gathering: float, patience: float) -> tuple[list[Item], bool]:
+        """Let items gather, wait for a rest, and take all of them; if the queue is closed meanwhile, at once.
 
         Args:
-            patience: How long they gather in [s]; less if the queue is closed meanwhile.
+            gathering: How long they gather in [s].
+            patience: Longest wait for a rest after that in [s].
 
         Returns:
             The items in their order, maybe none; and whether the queue was closed by then, so that no
             further ones follow.
         """
-        self._closed.wait(patience)
+        self._closed.wait(gathering)
+        self._resting.clear()
+        if not self.closed:
+            self._resting.wait(patience)
         with self._lock:
             items, self._items = self._items, []
             return items, self.closed
@@ -82,3 +92,4 @@ class Inbox(Generic[Item]):
         """Take nothing any more; what waits can still be taken."""
         with self._lock:
             self._closed.set()
+        self._resting.set()

@@ -20,8 +20,9 @@ from walk_optimizer.recording.topics import TopicInfo, require_message, require_
 DROPPED_KEY = "dropped_messages"
 """Key in the custom data of metadata.yaml under which a bag owns up to its gaps."""
 
-# So long messages gather in [s]: a thread that woke up for each would hold up those who write.
-_GATHERING = 0.02
+# So long messages gather, and then wait for a rest, in [s]: a thread that woke up for each would hold up
+# those who write.
+_GATHERING, _PATIENCE = 0.005, 0.02
 
 _logger = logging.getLogger(__name__)
 
@@ -152,6 +153,10 @@ class Recorder:
         require_message(self._topics, topic, data, log_time_ns)
         return self._inbox.offer(_Entry(topic, data, log_time_ns, publish_time_ns))
 
+    def rest(self) -> None:
+        """Say that nothing is written for a moment: the thread then has the time to store what waits."""
+        self._inbox.rest()
+
     def status(self) -> RecorderStatus:
         """Return how the recording is going."""
         progress = self._progress
@@ -192,7 +197,7 @@ class Recorder:
         next_flush = time.monotonic() + self.settings.flush_period
         closed = False
         while not closed:
-            items, closed = self._take(min(max(0.0, next_flush - time.monotonic()), _GATHERING))
+            items, closed = self._take(_GATHERING, _PATIENCE)
             for item in items:
                 self._store(writer, item)
             if time.monotonic() >= next_flush:
@@ -201,9 +206,9 @@ class Recorder:
                 next_flush = time.monotonic() + self.settings.flush_period
             self._note_progress(writer)
 
-    def _take(self, patience: float) -> tuple[list[_Entry | TopicInfo], bool]:
+    def _take(self, gathering: float = 0.0, patience: float = 0.0) -> tuple[list[_Entry | TopicInfo], bool]:
         """Take what waits in the queue, and count the messages that are from now on ours to store."""
-        items, closed = self._inbox.take(patience)
+        items, closed = self._inbox.take(gathering, patience)
         self._taken += sum(isinstance(item, _Entry) for item in items)
         return items, closed
 
@@ -239,7 +244,7 @@ class Recorder:
         """Close the bag, whatever happened to it, and count what is not in it."""
         self._report_dropped()
         self._inbox.close()
-        self._take(0.0)
+        self._take()
         lost = self._taken - writer.messages
         writer.custom_data[DROPPED_KEY] = str(self._inbox.rejected + lost)
         try:
