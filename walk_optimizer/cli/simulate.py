@@ -49,6 +49,7 @@ def add_parser(verbs: Subparsers) -> None:
         metavar="PERCENT",
         help="masses are larger than the feedback knows (default: 0)",
     )
+    parser.add_argument("--friction", metavar="MU", help="of the ground (default: the gait's)")
     parser.add_argument(
         "--without-feedback", action="store_true", help="play the gait's torques back and nothing else"
     )
@@ -76,6 +77,8 @@ def run(args: argparse.Namespace) -> int:
         picture_target(args.picture)
     gait = chosen_gait(args)
     loop = closed_loop(gait, simulation_settings()).heavier(1 + heavier / 100)
+    if args.friction is not None:
+        loop = loop.on_ground(_number(args.friction, "friction", "-"))
     disturbance = loop.disturbance(push, down)
     walk = loop.walk_without_feedback(steps) if args.without_feedback else loop.walk(steps, disturbance)
     print(_text(gait, loop, walk, steps))

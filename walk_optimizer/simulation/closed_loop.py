@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from walk_optimizer.errors import SolveFailedError
 from walk_optimizer.gait import Gait
+from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.simulation.controllers import Controller, FeedForward, PathFeedback
 from walk_optimizer.simulation.ground import StepGround
 from walk_optimizer.simulation.linearization import LinearizedStep
@@ -80,9 +81,14 @@ class ClosedLoop:
     def heavier(self, factor: float) -> "ClosedLoop":
         """Return the same feedback on a walker whose masses are so many times as large."""
         walker = self.plant.walker
-        masses = {name: factor * getattr(walker, name) for name in _MASSES}
-        plant = PinnedWalker(replace(walker, **masses), self.plant.spring, self.plant.stop)
-        return replace(self, plant=plant)
+        return self._on(replace(walker, **{name: factor * getattr(walker, name) for name in _MASSES}))
+
+    def on_ground(self, friction: float) -> "ClosedLoop":
+        """Return the same feedback on ground of another friction coefficient."""
+        return self._on(replace(self.plant.walker, friction_coefficient=friction))
+
+    def _on(self, walker: WalkerParameters) -> "ClosedLoop":
+        return replace(self, plant=PinnedWalker(walker, self.plant.spring, self.plant.stop))
 
     def largest_deviation(self, result: SimulatedWalk) -> float:
         """Return how far any joint was from the gait at the same place of the hip, in [rad]."""

@@ -60,10 +60,9 @@ class _Recursion:
     def of(cls, step: LinearizedStep, weights: RegulatorWeights) -> "_Recursion":
         """Return the problem of a step."""
         interval = step.reference.step_time / (PLACES - 1)
+        both = np.concatenate([step.following, step.input], axis=2)
         generator = np.zeros((PLACES - 1, STATE_WIDTH + 3, STATE_WIDTH + 3))
-        for name, rows in (("following", slice(0, STATE_WIDTH)), ("input", slice(STATE_WIDTH, None))):
-            values = getattr(step, name)
-            generator[:, :STATE_WIDTH, rows] = interval * (values[:-1] + values[1:]) / 2
+        generator[:, :STATE_WIDTH] = interval * (both[:-1] + both[1:]) / 2
         transitions = expm(generator)
         size = np.full(STATE_WIDTH, weights.speed)
         size[ANGLES] = weights.angle
