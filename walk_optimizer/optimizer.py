@@ -35,10 +35,12 @@ class Outcome:
     Attributes:
         gait: The gait; None unless it was solved and certified.
         report: How the search went.
+        others: Certified gaits of other optima that were met, best first.
     """
 
     gait: Gait | None
     report: SolveReport
+    others: tuple[Gait, ...] = ()
 
 
 def optimize(
@@ -122,8 +124,10 @@ class _Pipeline:
         freed = self.session.map(self._freed, optima[: self.settings.freed_optima])
         if self.session.verdict is Status.CANCELLED:
             return self._failure(candidates)
-        # None is freed if the time is over by now.
-        return self._certified(min([*freed, optima[0]], key=lambda one: one.mean_effort))
+        best, *others = distinct([*freed, *optima])
+        outcome = self._certified(best)
+        gaits = (self._certified(one).gait for one in others)
+        return replace(outcome, others=tuple(gait for gait in gaits if gait is not None))
 
     def _freed(self, candidate: Candidate) -> Candidate:
         rounds, iterations = self.settings.contact_rounds, self.settings.contact_iterations

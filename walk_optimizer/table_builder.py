@@ -196,8 +196,9 @@ class _Builder:
         for done, future in enumerate(as_completed(futures), start=1):
             job, outcome = futures[future], future.result()
             kept = outcome.gait is not None and self._is_better(job.key, outcome.gait)
-            if outcome.gait is not None:
-                self._note(job.key, outcome.gait)
+            for gait in (outcome.gait, *outcome.others):
+                if gait is not None:
+                    self._note(job.key, gait)
             if kept and outcome.gait is not None:
                 self.table[job.key] = outcome.gait
                 improved.add(job.key)
