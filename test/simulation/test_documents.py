@@ -1,0 +1,50 @@
+"""docs/walking.md says what the program measures."""
+
+from pathlib import Path
+
+import pytest
+
+from walk_optimizer.errors import ConfigurationError
+from walk_optimizer.simulation import settings as module
+from walk_optimizer.simulation.ending import Ending
+from walk_optimizer.simulation.settings import SimulationSettings, simulation_settings
+from walk_optimizer.simulation.table import HEADINGS, orbit_cells
+
+PAGE = Path(__file__).parents[2] / "docs" / "walking.md"
+
+
+def documented_rows() -> dict[tuple[str, ...], tuple[str, ...]]:
+    """Cells after speed and springs, by speed and springs."""
+    lines = [line.strip("| \n") for line in PAGE.read_text().splitlines() if line.startswith("| ")]
+    rows = [tuple(cell.strip() for cell in line.split("|")) for line in lines]
+    assert rows[0] == HEADINGS
+    return {row[:2]: row[2:] for row in rows[2:]}
+
+
+def test_the_table_holds_every_gait_and_what_is_measured_now(loop):
+    rows = documented_rows()
+    assert len(rows) == 21
+    row = rows["1.50", "stiffness_and_equilibrium"]
+    assert row[:3] == orbit_cells(loop)
+    assert (row[3] == "yes") is (loop.walk(5).ending is Ending.LANDED)
+    fatal = loop.disturbance(push=float(row[4]) + 1.0)
+    assert loop.walk(loop.settings.disturbed_step + 8, fatal).ending.is_fall
+
+
+def test_impossible_settings_are_refused_with_their_name(tmp_path, monkeypatch):
+    packaged = module.config_file("simulation.yaml").read_text()
+    wrong = tmp_path / "simulation.yaml"
+    monkeypatch.setattr(module, "config_file", lambda _: wrong)
+    for text, named in (
+        (packaged.replace("steps: 20", "steps: 0"), "steps"),
+        (packaged.replace("  damping: 1.0", "  bounce: 1.0"), "knee_stop"),
+        (packaged.replace("lowest_hip: 0.6", "lowest_hip: 1.5"), "lowest_hip"),
+        (packaged + "more: 1\n", "more"),
+    ):
+        wrong.write_text(text)
+        with pytest.raises(ConfigurationError, match=named):
+            simulation_settings.__wrapped__()
+
+
+def test_the_packaged_settings_are_read():
+    assert isinstance(simulation_settings(), SimulationSettings)
