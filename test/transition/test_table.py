@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from walk_optimizer.errors import GaitFileError, GaitNotFoundError
+from walk_optimizer.library import GaitLibrary
 from walk_optimizer.mechanics import mechanics_at
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.profile import RefinedProfile, StepSample
@@ -18,7 +19,7 @@ from walk_optimizer.transition.certificate import certify_steps
 from walk_optimizer.transition.files import TransitionName, read_transition_file
 from walk_optimizer.transition.paces import Pace, pace_name, refined_of
 from walk_optimizer.transition.standing import Standing
-from walk_optimizer.transition.table import TransitionTable, cache_folder
+from walk_optimizer.transition.table import TransitionTable, cache_folder, packaged_stand, table_folder
 from walk_optimizer.transition.transition import Transition
 
 SPRUNG = SpringMode.STIFFNESS_AND_EQUILIBRIUM
@@ -175,3 +176,22 @@ def test_only_what_is_certified_is_stored(table, solved):
 def test_walkers_do_not_meet_in_the_cache():
     assert cache_folder(WalkerParameters()) != cache_folder(WalkerParameters(hip_mass=50.0))
     assert cache_folder(WalkerParameters()).parent.name == "transitions"
+
+
+def test_a_file_of_ones_own_that_no_longer_fits_leaves_the_packaged_one(tmp_path):
+    walker = WalkerParameters.from_yaml()
+    gait = GaitLibrary(walker, tmp_path).find(0.25 / 0.785, SPRUNG)[0]
+    stand = packaged_stand(walker)
+    packaged = TransitionTable(walker, tmp_path).find(stand, gait)
+    assert packaged is not None
+    # Of the same names, but into a gait with the end of another one.
+    (name,) = (path.name for path in table_folder().glob(f"stand__{pace_name(gait)}__*"))
+    (other,) = table_folder().glob(
+        f"stand__{pace_name(gait).replace('0.2500m_0.7850s', '0.3000m_0.7200s')}__*"
+    )
+    (tmp_path / name).write_bytes(other.read_bytes())
+    table = TransitionTable(walker, tmp_path)
+    found = table.find(stand, gait)
+    assert found is not None
+    np.testing.assert_array_equal(found.peak_torques, packaged.peak_torques)
+    assert [str(tmp_path / name) in problem for problem in table.problems()] == [True]

@@ -55,13 +55,14 @@ class TransitionTable:
         self.walker = walker
         self.folder = folder if folder is not None else cache_folder(walker)
         self._create = folder is None
-        self._files: dict[TransitionName, Path] = {}
+        # The user's own come first; one that no longer fits its gaits leaves the packaged one to serve.
+        self._files: dict[TransitionName, tuple[Path, ...]] = {}
         self._problems: dict[Path, str] = {}
         for place in (table_folder(), self.folder):
             for path in sorted(place.glob(f"*{SUFFIX}")):
                 name = TransitionName.parse(path, walker)
                 if name is not None:
-                    self._files[name] = path
+                    self._files[name] = (path, *self._files.get(name, ()))
 
     def names(self) -> tuple[TransitionName, ...]:
         """Return which transitions there are, by source, target and number of steps."""
@@ -81,8 +82,8 @@ class TransitionTable:
         """
         wanted = (pace_name(source), pace_name(target))
         names = [name for name in self._files if (name.source, name.target) == wanted]
-        for name in sorted(names, key=lambda one: one.steps):
-            path = self._files[name]
+        ordered = sorted(names, key=lambda one: one.steps)
+        for path in (path for name in ordered for path in self._files[name]):
             try:
                 transition = read_transition_file(path, source, target)
             except GaitFileError as error:
@@ -104,7 +105,9 @@ class TransitionTable:
             raise GaitFileError("the transition is for another walker than the table")
         writable_folder(self.folder, self._create)
         path = write_transition_file(transition, self.folder)
-        self._files = {**self._files, TransitionName.of(transition): path}
+        name = TransitionName.of(transition)
+        others = (one for one in self._files.get(name, ()) if one != path)
+        self._files = {**self._files, name: (path, *others)}
         self._problems.pop(path, None)
         return path
 
