@@ -5,8 +5,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 
 from walk_optimizer.errors import SolveFailedError
-from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.library import GaitLibrary
+from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import Outcome
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import Progress, ProgressCallback, SolveReport, Status
