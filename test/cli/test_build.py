@@ -6,7 +6,7 @@ import pytest
 from library.made_up_gait import made_up_gait
 
 from walk_optimizer.certificate import certify
-from walk_optimizer.cli.library_build import bar_text, minutes, solve_text, store_better
+from walk_optimizer.cli.library_build import bar_text, former_gaits, minutes, solve_text, store_better
 from walk_optimizer.gait_files import read_gait_file
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize
@@ -77,3 +77,11 @@ def test_a_gait_that_was_refined_again_is_stored(tmp_path, solved):
     assert store_better(solved, tmp_path)
     assert store_better(again, tmp_path)
     assert not store_better(replace(again, refined=None), tmp_path)
+
+
+def test_a_build_begins_with_the_certified_gaits_of_its_folder_alone(tmp_path, solved):
+    assert former_gaits(tmp_path, solved.walker) == []
+    store_better(solved, tmp_path)
+    (tmp_path / "torn.npz").write_bytes(b"torn")
+    (former,) = former_gaits(tmp_path, solved.walker)
+    assert former.objective == solved.objective

@@ -18,6 +18,7 @@ from walk_optimizer.request import KMH_PER_MS, gait_table_settings
 
 if TYPE_CHECKING:
     from walk_optimizer.gait import Gait
+    from walk_optimizer.model.parameters import WalkerParameters
     from walk_optimizer.table_builder import TableProgress
 
 _TEXT = """\
@@ -57,19 +58,28 @@ def run(args: argparse.Namespace) -> int:
     points = None if args.points is None else parse_points(args.points)
 
     from walk_optimizer.gait_files.access import writable_folder
-    from walk_optimizer.library import GaitLibrary, table_folder
+    from walk_optimizer.library import table_folder
     from walk_optimizer.model.parameters import SpringMode
     from walk_optimizer.table_builder import build_table
 
     folder = args.output or table_folder()
     writable_folder(folder, create=args.output is None)
-    known = GaitLibrary(walker, folder).gaits()
+    known = former_gaits(folder, walker)
     display = BuildDisplay(folder)
     with _children_end_on_interrupt():
         gaits = build_table(walker, processes=jobs, points=points, known=known, on_progress=display)
     expected = gait_table_settings().gaits * len(SpringMode)
     print(f"{len(gaits)} of {expected} gaits solved in {minutes(display.elapsed)}; files in {folder}")
     return 0 if len(gaits) == expected else 1
+
+
+def former_gaits(folder: Path, walker: "WalkerParameters") -> list["Gait"]:
+    """Return the gaits of a folder whose certificates hold."""
+    from walk_optimizer.gait_files import SUFFIX
+    from walk_optimizer.verification import verify_file
+
+    verified = (verify_file(path, walker) for path in sorted(folder.glob(f"*{SUFFIX}")))
+    return [one.gait for one in verified if one.passed and one.gait is not None]
 
 
 class BuildDisplay:
