@@ -159,8 +159,8 @@ def whole_table(bench: Bench, speeds: Sequence[int]) -> str:
     header = ["entry", "our F", "plain search", "plain refinement"]
     head = verdict("20 times faster", [total / once], 20)
     note = (
-        f"Each of the {count * len(MODES)} gaits searched for and refined once, one after the other, in a process "
-        f"of its own, as plain does it: {seconds(once)}."
+        f"Each of the {count * len(MODES)} gaits searched for and refined once, one after the other, in a "
+        f"process of its own, as plain does it: {seconds(once)}."
     )
     return f"{head}\n\n{note} {_table_note(build, total, len(speeds), count)}\n\n{table(header, rows)}"
 
@@ -173,8 +173,8 @@ def _table_note(build: Build, total: float, measured: int, count: int) -> str:
     return (
         f"`walk-optimizer library build`: {len(build.gaits)} certified gaits, {refined} of them refined, in "
         f"{seconds(build.seconds)} on {os.cpu_count()} cores, {seconds(build.processor)} of processor time; "
-        f"{times_text(total / build.seconds)} times as fast as plain; it searches longer, continues every entry "
-        "from its neighbours and refines all good optima, which plain does not do. Plain, in one process as a "
+        f"{times_text(total / build.seconds)} times as fast as plain; it searches longer, continues every "
+        "entry from its neighbours and refines all good optima, which plain does not. Plain, in one process as a "
         f"script does it: {seconds(total)}, measured on {share}; a search that fails counts with the time "
         f"that it was given. Ratio of processor times: {times_text(total / build.processor)}. Plain "
         "refinement has the phases and the adapted mesh of the shipped gait; its F is the integral of "
