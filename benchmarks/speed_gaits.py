@@ -174,9 +174,9 @@ def _table_note(build: Build, total: float, measured: int, count: int) -> str:
         f"`walk-optimizer library build`: {len(build.gaits)} certified gaits, {refined} of them refined, in "
         f"{seconds(build.seconds)} on {os.cpu_count()} cores, {seconds(build.processor)} of processor time; "
         f"{times_text(total / build.seconds)} times as fast as plain; it searches longer, continues every "
-        "entry from its neighbours and refines all good optima, which plain does not. Plain, in one process as a "
-        f"script does it: {seconds(total)}, measured on {share}; a search that fails counts with the time "
-        f"that it was given. Ratio of processor times: {times_text(total / build.processor)}. Plain "
+        "entry from its neighbours and refines all good optima, which plain does not. Plain, in one process "
+        f"as a script does it: {seconds(total)}, measured on {share}; a search that fails counts with the "
+        f"time that it was given. Ratio of processor times: {times_text(total / build.processor)}. Plain "
         "refinement has the phases and the adapted mesh of the shipped gait; its F is the integral of "
         "|u|^2 / 2 in (N m)^2 s."
     )
