@@ -110,7 +110,7 @@ def select(entries: Sequence[LibraryEntry], query: Query) -> tuple[Gait, Source]
 
 def _blended(entries: list[LibraryEntry], query: Query) -> Gait:
     """Return the blend of the gaits next to a speed; raise GaitNotFoundError where there is none."""
-    usable = [entry for entry in entries if entry.gait.refined is not None and _is_on_line(entry)]
+    usable = [entry for entry in entries if entry.gait.refined is not None and is_on_line(entry.gait.request)]
     below = [entry.gait for entry in usable if entry.gait.request.speed < query.speed]
     above = [entry.gait for entry in usable if entry.gait.request.speed > query.speed]
     try:
@@ -123,9 +123,8 @@ def _blended(entries: list[LibraryEntry], query: Query) -> Gait:
         raise GaitNotFoundError(f"{_not_found(entries, query)}; {error}") from error
 
 
-def _is_on_line(entry: LibraryEntry) -> bool:
-    """Return whether a gait has the step that a request for its speed would have."""
-    request = entry.gait.request
+def is_on_line(request: GaitRequest) -> bool:
+    """Return whether a request has the step that one for its speed alone would have."""
     return math.isclose(request.step_length, GaitRequest.for_speed(request.speed).step_length, rel_tol=1e-6)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from walk_optimizer.gait import Gait
 from walk_optimizer.library import GaitLibrary
-from walk_optimizer.library_selection import EXACT_SPEED_TOLERANCE
+from walk_optimizer.library_selection import EXACT_SPEED_TOLERANCE, is_on_line
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize
 from walk_optimizer.request import GaitRequest
@@ -61,7 +61,7 @@ def neighbours(gaits: Sequence[Gait], request: GaitRequest) -> list[Gait]:
         gaits: All that there are.
         request: What is asked for.
     """
-    if request != GaitRequest.for_speed(request.speed, request.spring_mode, request.points):
+    if not is_on_line(request):
         return []
     fitting = [gait for gait in gaits if gait.request.spring_mode is request.spring_mode]
 

@@ -3,6 +3,8 @@
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.library import GaitLibrary
@@ -82,3 +84,11 @@ def test_a_time_limit_of_nothing_is_refused(library):
     for request in (GaitRequest.for_speed(BETWEEN), replace(GaitRequest.for_speed(BETWEEN), step_length=0.3)):
         with pytest.raises(InvalidRequestError, match="time limit is 0"):
             optimize_from(library, request, WALKER, time_limit=0.0)
+
+
+@given(st.floats(SPEEDS[0], SPEEDS[-1]), st.sampled_from(["none", "stiffness", "stiffness_and_equilibrium"]))
+def test_every_speed_of_the_table_has_neighbours(library, speed, mode):
+    found = neighbours(library.gaits(), GaitRequest.for_speed(speed, mode))
+    assert 1 <= len(found) <= 2
+    assert found[0].request.speed <= speed + 1e-4
+    assert found[-1].request.speed >= speed - 1e-4
