@@ -15,27 +15,22 @@
 #include "dense_front.h"
 #include "factors.h"
 
-/* Sweeps of the scaling, each of which begins with the scales of the matrix before. */
-#define SCALING_SWEEPS 1
-
-/* Bring the largest entries of all columns near to 1.
+/* Bring the largest entries of all columns nearer to 1, beginning with the scales of the matrix before.
  *
  * D. Ruiz: A scaling algorithm to equilibrate both rows and columns norms in matrices. RAL-TR-2001-034.
  * Barrier terms range over thirty decades: without this, small entries that matter look like rounding. */
 static void equilibrate(const Analysis *analysis, const double *values, Factors *factors) {
     int n = analysis->tree->n;
     double *restrict scale = factors->scale, *restrict largest = factors->largest;
-    for (int sweep = 0; sweep < SCALING_SWEEPS; sweep++) {
-        for (int i = 0; i < n; i++) largest[i] = 0.0;
-        for (int e = 0; e < analysis->entry_count; e++) {
-            int i = analysis->row[e], j = analysis->column[e];
-            double value = fabs(values[analysis->entry[e]]) * scale[i] * scale[j];
-            if (value > largest[i]) largest[i] = value;
-            if (value > largest[j]) largest[j] = value;
-        }
-        for (int i = 0; i < n; i++)
-            if (largest[i] > 0.0) scale[i] /= sqrt(largest[i]);
+    for (int i = 0; i < n; i++) largest[i] = 0.0;
+    for (int e = 0; e < analysis->entry_count; e++) {
+        int i = analysis->row[e], j = analysis->column[e];
+        double value = fabs(values[analysis->entry[e]]) * scale[i] * scale[j];
+        if (value > largest[i]) largest[i] = value;
+        if (value > largest[j]) largest[j] = value;
     }
+    for (int i = 0; i < n; i++)
+        if (largest[i] > 0.0) scale[i] /= sqrt(largest[i]);
 }
 
 /* List the unknowns of front f: its pivots, those delayed by its children, its border.
@@ -49,20 +44,16 @@ static int list_unknowns(const AssemblyTree *tree, int f, Factors *factors) {
     for (size_t w = factors->waiting.used; w > 0; w--) {
         int child = factors->waiting.data[w - 1];
         if (tree->parent[child] != f) break;
-        int pivots = factors->fronts[child].size - factors->fronts[child].eliminated;
-        delayed += pivots - (tree->border_begin[child + 1] - tree->border_begin[child]);
+        delayed += factors->fronts[child].delayed;
     }
     if (!reserve_integers(indices, own + delayed + border)) return -1;
     front->unknowns = indices->used;
     int *list = indices->data + indices->used, size = own;
     memcpy(list, factors->pivots + tree->pivot_begin[f], own * sizeof(int));
-    for (size_t w = factors->waiting.used; w > 0; w--) {
-        int child = factors->waiting.data[w - 1];
-        if (tree->parent[child] != f) break;
-        const Front *from = &factors->fronts[child];
-        int count = from->size - from->eliminated - (tree->border_begin[child + 1] - tree->border_begin[child]);
-        memcpy(list + size, indices->data + from->unknowns + from->eliminated, count * sizeof(int));
-        size += count;
+    for (size_t w = factors->waiting.used; size < own + (int)delayed; w--) {
+        const Front *from = &factors->fronts[factors->waiting.data[w - 1]];
+        memcpy(list + size, indices->data + from->unknowns + from->eliminated, from->delayed * sizeof(int));
+        size += from->delayed;
     }
     int candidates = size;
     memcpy(list + size, tree->border + tree->border_begin[f], border * sizeof(int));
@@ -116,6 +107,7 @@ static void eliminate_front(Factors *factors, Front *front, int candidates, doub
     DenseFront dense = {a, size, candidates, unknowns, diagonal, diagonal + size};
     Elimination done = eliminate_candidates(&dense, threshold, smallest);
     front->eliminated = done.eliminated;
+    front->delayed = candidates - done.eliminated;
     inertia->rank += done.eliminated;
     inertia->negative += done.negative;
     inertia->two_by_two += done.two_by_two;
@@ -170,7 +162,7 @@ int factor(const Analysis *analysis, const double *values, double threshold, dou
         remember_order(analysis, factors, f, candidates);
         if (!store(factors, f)) return 0;
         int eliminated = front->eliminated, size = front->size;
-        inertia->delayed += candidates - eliminated;
+        inertia->delayed += front->delayed;
         inertia->largest_front = size > inertia->largest_front ? size : inertia->largest_front;
         inertia->entries += (long)eliminated * (2 * size - eliminated + 1) / 2;
         for (int p = 0; p < eliminated; p++) inertia->operations += (long)(size - p) * (size - p + 1) / 2;

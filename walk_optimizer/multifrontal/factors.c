@@ -4,24 +4,24 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Return the data of an array with room for so many items, moved if need be; the array's own if memory
+ * runs out, with the room as it was. */
+static void *grown(void *data, size_t needed, size_t *room, size_t item) {
+    if (needed <= *room) return data;
+    void *moved = realloc(data, (*room + needed) * item);
+    if (moved == NULL) return data;
+    *room += needed;
+    return moved;
+}
+
 int reserve_doubles(Doubles *array, size_t count) {
-    if (array->used + count <= array->room) return 1;
-    size_t room = 2 * array->room + count;
-    double *data = realloc(array->data, room * sizeof *data);
-    if (data == NULL) return 0;
-    array->data = data;
-    array->room = room;
-    return 1;
+    array->data = grown(array->data, array->used + count, &array->room, sizeof *array->data);
+    return array->used + count <= array->room;
 }
 
 int reserve_integers(Integers *array, size_t count) {
-    if (array->used + count <= array->room) return 1;
-    size_t room = 2 * array->room + count;
-    int *data = realloc(array->data, room * sizeof *data);
-    if (data == NULL) return 0;
-    array->data = data;
-    array->room = room;
-    return 1;
+    array->data = grown(array->data, array->used + count, &array->room, sizeof *array->data);
+    return array->used + count <= array->room;
 }
 
 /* Give every entry of the matrix to the front that eliminates the first of its two unknowns. */

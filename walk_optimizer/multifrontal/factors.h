@@ -18,7 +18,7 @@ struct Analysis {
 
 /* One front after its elimination. L is unit lower triangular at its top. */
 typedef struct {
-    int size, eliminated;
+    int size, eliminated, delayed;
     size_t unknowns;     /* [size] among the indices, pivots first */
     size_t columns;      /* [size x eliminated] of L among the values */
     size_t diagonal;     /* [eliminated] of D among the values */
