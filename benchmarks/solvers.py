@@ -27,7 +27,7 @@ from walk_optimizer.gait import Trajectory
 from walk_optimizer.guess import kinematic_guess
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.search import with_slip_speeds
+from walk_optimizer.search import completed
 from walk_optimizer.solve.back_end import SolveOptions
 from walk_optimizer.solve.registry import BACK_ENDS, back_end
 from walk_optimizer.solve.settings import solver_settings
@@ -133,12 +133,12 @@ def _posed(request: GaitRequest, walker: WalkerParameters, kind: str) -> tuple[P
         return relaxed, start
     optimum = back_end("ipopt").solve(schedule, start, SolveOptions())
     points, spring = from_scaled(walker, optimum.x)
-    return relaxed, to_scaled(walker, with_slip_speeds(walker, points), spring)
+    return relaxed, to_scaled(walker, completed(walker, points), spring)
 
 
 def _judged(request: GaitRequest, walker: WalkerParameters, solution: Solution, seconds: float) -> Row:
     points, spring = from_scaled(walker, solution.x)
-    trajectory = Trajectory.from_stacked(with_slip_speeds(walker, points), request.step_time)
+    trajectory = Trajectory.from_stacked(completed(walker, points), request.step_time)
     worst = certify(walker, request, spring, trajectory).worst
     says = solution.status.value
     objective = trajectory.torque_cost

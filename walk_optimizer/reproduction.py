@@ -71,7 +71,7 @@ def sparsity(walker: WalkerParameters, points: int) -> NDArray[np.bool_]:
         *range(layout.DYNAMICS.start, layout.DYNAMICS.stop),
         *range(layout.PRODUCTS.start, layout.PRODUCTS.stop),
     ]
-    rows = [point * layout.ROW_WIDTH + row for row in kept for point in range(points)]
+    rows = [point * layout.REPORT_ROWS.stop + row for row in kept for point in range(points)]
     columns = [
         point * layout.POINT_WIDTH + place for place in range(layout.POINT_WIDTH) for point in range(points)
     ]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.contact.observation import schedule_of, slip_velocities
-from walk_optimizer.contact.schedule import CONTACT_FAMILIES, Schedule
+from walk_optimizer.contact.schedule import CONTACT_FAMILIES, FootMode, Schedule
 from walk_optimizer.gait import Gait
 from walk_optimizer.guess import Start, kinematic_guess, resampled
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
@@ -33,6 +33,8 @@ SAME_OPTIMUM = 1e-4
 # optima of another grid or of a neighbouring request.
 _NEAR = 1e-9
 _RESAMPLED = 1e-4
+# Rows of lambda_x+ and lambda_x- of each foot.
+_TANGENTIAL = tuple((layout.REACTION.start + k, layout.REACTION.start + k + 1) for k in (0, 3))
 # What contacts of no family are called.
 OWN_CONTACTS = "found"
 
@@ -82,11 +84,28 @@ def distinct(candidates: Iterable[Candidate]) -> list[Candidate]:
     return kept
 
 
-def with_slip_speeds(walker: WalkerParameters, points: FloatArray) -> FloatArray:
-    """Return the points (23, N) with gamma = |slip|, the least that eqs. (5c) and (5d) allow."""
-    completed = points.copy()
-    completed[layout.SLIP] = np.abs(slip_velocities(walker, points[layout.Q], points[layout.P]))
-    return completed
+def completed(walker: WalkerParameters, points: FloatArray) -> FloatArray:
+    """Return the solution of a fixed schedule as one of eq. (5), (23, N).
+
+    Its net tangential forces are split into the least lambda_x+ and lambda_x-, and gamma is |slip|,
+    the least that eqs. (5c) and (5d) allow.
+    """
+    complete = points.copy()
+    for forward, backward in _TANGENTIAL:
+        net = points[forward] - points[backward]
+        complete[forward], complete[backward] = np.maximum(net, 0.0), np.maximum(-net, 0.0)
+    complete[layout.SLIP] = np.abs(slip_velocities(walker, points[layout.Q], points[layout.P]))
+    return complete
+
+
+def _with_net_forces(points: FloatArray, schedule: Schedule) -> FloatArray:
+    """Return the points (23, N) with the net tangential forces of feet that stick as lambda_x+."""
+    net = points.copy()
+    for (forward, backward), modes in zip(_TANGENTIAL, schedule, strict=True):
+        sticks = modes == FootMode.STICK
+        net[forward, sticks] -= net[backward, sticks]
+        net[backward, sticks] = 0.0
+    return net
 
 
 class Search:
@@ -195,8 +214,9 @@ class Search:
     ) -> Candidate:
         request = replace(self.request, points=schedule.shape[1])
         problem = fixed_schedule_problem(request, self.walker, schedule)
+        guess = replace(guess, points=_with_net_forces(guess.points, schedule))
         solved = self._solve(problem, guess, stage, options)
-        return replace(solved, points=with_slip_speeds(self.walker, solved.points))
+        return replace(solved, points=completed(self.walker, solved.points))
 
     def _solve(self, problem: Problem, guess: Candidate, stage: str, options: SolveOptions) -> Candidate:
         # The scaled objective is the integral of 1/2 |u|^2, F its sum over the grid points.

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
-from transcription.plain_program import dense, plain_program, random_scaled_point
+from transcription.plain_program import REPORT_ROWS, ROWS, dense, plain_program, random_scaled_point
 
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
@@ -39,7 +39,10 @@ def plain(request_of_three_points, walker, complementarity):
     generator = np.random.default_rng(5)
     x_value = random_scaled_point(request_of_three_points, generator)
     x, objective, g = plain_program(request_of_three_points, walker)
-    multipliers = generator.normal(size=g.numel())
+    # The rows of the report: those of each point, and the last one.
+    report = np.flatnonzero(np.arange(g.numel()) % ROWS < REPORT_ROWS)
+    multipliers = np.zeros(g.numel())
+    multipliers[report] = generator.normal(size=report.size)
     # The unit of the program's objective is its own choice.
     value = complementarity.nlp.gradient(x_value, complementarity.parameters)[0]
     unit = float(value) / float(ca.evalf(ca.substitute(objective, x, x_value)))
@@ -49,6 +52,7 @@ def plain(request_of_three_points, walker, complementarity):
     return SimpleNamespace(
         x=x_value,
         sigma=0.7,
+        report=report,
         multipliers=multipliers,
         unit=unit,
         objective=ca.Function("objective", [x], [objective]),

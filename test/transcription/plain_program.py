@@ -9,7 +9,8 @@ import numpy as np
 
 from walk_optimizer.transcription.scaling import point_units, row_units, spring_units
 
-POINT, ROWS = 23, 28
+# Columns and rows of a point; the first of its rows are the report's.
+POINT, ROWS, REPORT_ROWS = 23, 32, 28
 
 
 def leg_points(walker, q, leg):
@@ -40,7 +41,7 @@ def ground_height(terrain, tread, x):
 
 
 def point_rows(walker, request):
-    """(point, state before, spring) -> 12 dynamics, 8 sides a, 8 products a b, in SI units."""
+    """(point, state before, spring) -> 12 dynamics, 8 sides a, 8 products a b, 4 of cones, in SI units."""
     tangent = ca.DM([np.cos(walker.terrain.slope), np.sin(walker.terrain.slope)])
     across = ca.DM([-np.sin(walker.terrain.slope), np.cos(walker.terrain.slope)])
     point, before, spring = ca.SX.sym("point", POINT), ca.SX.sym("before", 12), ca.SX.sym("spring", 2)
@@ -62,7 +63,12 @@ def point_rows(walker, request):
             (gamma[leg] - slip, backward),
         ]
     defects = point[:12] - before - request.interval * ca.vertcat(qdot, pdot)
-    rows = ca.vertcat(defects, *(a for a, _ in sides), *(a * b for a, b in sides))
+    cones = []
+    for leg in range(2):
+        forward, backward, normal = (point[15 + 3 * leg + k] for k in range(3))
+        limit = walker.friction_coefficient * normal
+        cones += [limit - forward + backward, limit + forward - backward]
+    rows = ca.vertcat(defects, *(a for a, _ in sides), *(a * b for a, b in sides), *cones)
     return ca.Function("point_rows", [point, before, spring], [rows])
 
 

@@ -88,7 +88,7 @@ def test_a_schedule_fixes_what_each_mode_excludes():
     x_plus, x_minus, normal, gamma = 15, 16, 17, 21
     expected = {
         FootMode.FREE: {x_plus, x_minus, normal, gamma},
-        FootMode.STICK: {gamma},
+        FootMode.STICK: {gamma, x_minus},
         FootMode.SLIP_FORWARD: {x_plus},
         FootMode.SLIP_BACKWARD: {x_minus},
     }
@@ -96,8 +96,10 @@ def test_a_schedule_fixes_what_each_mode_excludes():
         of_foot_1 = {row for row in (x_plus, x_minus, normal, gamma) if fixed[row, point]}
         assert of_foot_1 == expected[mode]
     assert fixed[[18, 19, 20, 22]].all(), "foot 2 is free throughout"
-    # 12 dynamics and the gap of foot 2 a point; of foot 1: gap, and for a loaded foot cone and slip.
-    assert problem.lower_g.size == 4 * 13 + (1 + 3 + 3 + 3) + 1
+    assert lower[x_plus, list(FootMode).index(FootMode.STICK)] == -np.inf, "the net force"
+    # 12 dynamics and the gap of foot 2 a point; of foot 1: gap, and for a loaded foot cone, of which one that
+    # sticks has two sides, and slip.
+    assert problem.lower_g.size == 4 * 13 + (1 + 4 + 3 + 3) + 1
 
 
 def test_scaling_there_and_back():

@@ -20,6 +20,24 @@ def net_force(walker: SymbolicWalker, reaction: ca.SX) -> ca.SX:
     return ca.horzcat(*(ground.horizontal_and_vertical(walker, one[0] - one[1], one[2]) for one in feet))
 
 
+def cone_sides(walker: SymbolicWalker, reaction: ca.SX) -> ca.SX:
+    """Return how far the net force of each foot is inside its friction cone, (4,) in [N].
+
+    Args:
+        walker: The walker.
+        reaction: lambda, (6,), in [N].
+
+    Returns:
+        mu times the normal force, less and plus the tangential force; of foot 1, then of foot 2.
+    """
+    sides = []
+    for leg in range(2):
+        forward, backward, normal = (reaction[3 * leg + k] for k in range(3))
+        limit = walker.friction_coefficient * normal
+        sides += [limit - (forward - backward), limit + (forward - backward)]
+    return ca.vertcat(*sides)
+
+
 def foot_contact(
     walker: SymbolicWalker, q: ca.SX, qdot: ca.SX, reaction: ca.SX, slip_speed: ca.SX, leg: int
 ) -> ContactPoint:

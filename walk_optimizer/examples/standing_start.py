@@ -101,7 +101,9 @@ def start_functions() -> list[ca.Function]:
 
 @lru_cache(maxsize=4)
 def _assembled(points: int) -> Nlp:
-    stages = [Stage(euler_kind(), (0, 1), np.ones(layout.ROW_WIDTH, dtype=bool))] * points
+    of_report = np.zeros(layout.ROW_WIDTH, dtype=bool)
+    of_report[layout.REPORT_ROWS] = True
+    stages = [Stage(euler_kind(), (0, 1), of_report)] * points
     ends = Ends("standing_start", compiled(start_functions))
     return assemble(stages, ends, layout.SPRING_WIDTH, np.zeros((0, layout.SPRING_WIDTH)))
 

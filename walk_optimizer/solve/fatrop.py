@@ -22,7 +22,7 @@ from walk_optimizer.transcription.program import Nlp, Problem, StageOrder
 # Smaller pivots, divided by the number of stages, are left to an earlier stage: the shorter a stage, the
 # less its controls can do. With a value that does not fit, fatrop's search for a factorisation of the right
 # inertia may never end.
-_PIVOT_TOLERANCE = 2e-3
+_PIVOT_TOLERANCE = 1e-2
 # Fatrop widens every bound by 1e-8, and has no option against it.
 _WIDENED = 1e-8
 

@@ -5,7 +5,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
-from walk_optimizer.contact.feet import contact_pairs, net_force
+from walk_optimizer.contact.feet import cone_sides, contact_pairs, net_force
 from walk_optimizer.model import dynamics
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.transcription import layout
@@ -35,10 +35,7 @@ def euler_rows(
 
 
 def physical_rows() -> ca.Function:
-    """Return (point, state before, spring, h, walker) -> the 28 rows of a grid point, all in SI units.
-
-    The rows are the dynamics, the sides a of the pairs and their products a b.
-    """
+    """Return (point, state before, spring, h, walker) -> the rows of a grid point, (32,), in SI units."""
     walker = SymbolicWalker()
     column, previous = ca.SX.sym("point", layout.POINT_WIDTH), ca.SX.sym("previous", 12)
     spring, interval = ca.SX.sym("spring", 2), ca.SX.sym("h")
@@ -50,7 +47,7 @@ def physical_rows() -> ca.Function:
     pairs = contact_pairs(walker, point.q, qdot, point.reaction, point.slip_speed)
     rows = euler_rows(state, previous, ca.vertcat(qdot, pdot), interval, pairs)
     inputs = [column, previous, spring, interval, walker.symbols]
-    return ca.Function("physical_rows", inputs, [rows])
+    return ca.Function("physical_rows", inputs, [ca.vertcat(rows, cone_sides(walker, point.reaction))])
 
 
 def euler_functions() -> list[ca.Function]:

@@ -17,11 +17,15 @@ STATE_WIDTH = 12
 POINT_WIDTH = 23
 SPRING_WIDTH = 2
 
-# Rows of one grid point's column of constraints: dynamics, the sides a of the pairs, the products a b.
+# Rows of one grid point's column of constraints: dynamics, the sides a of the pairs, the products a b, and,
+# for given contacts, both sides of each foot's friction cone, mu lambda_y -+ (lambda_x+ - lambda_x-).
 DYNAMICS = slice(0, 12)
 PAIR_SIDES = slice(12, 20)
 PRODUCTS = slice(20, 28)
-ROW_WIDTH = 28
+CONE_SIDES = slice(28, 32)
+ROW_WIDTH = 32
+# The report's own; the rest is for given contacts.
+REPORT_ROWS = slice(0, 28)
 
 
 @dataclass(frozen=True)

@@ -114,7 +114,9 @@ def fixed_schedule_problem(request: GaitRequest, walker: WalkerParameters, sched
     """Return the smooth problem in which every foot does at each point what the schedule says.
 
     A foot that sticks is pinned by its height and its tangential velocity, as eqs. (5a), (5c) and
-    (5d) have it: a foot pinned by position slips on the implicit Euler grid.
+    (5d) have it: a foot pinned by position slips on the implicit Euler grid. Its lambda_x+ is the net
+    tangential force, of either sign, and its lambda_x- zero: any pair with the same difference does the
+    same, and without a choice between them solvers take twice as many iterations.
 
     Args:
         request: Speed, step, spring mode and grid.
@@ -131,7 +133,7 @@ def fixed_schedule_problem(request: GaitRequest, walker: WalkerParameters, sched
 def _apply_mode(bounds: _Bounds, foot: int, mode: FootMode, where: NDArray[np.bool_]) -> None:
     """Set the bounds of one foot at the points (N,) where it is in a mode."""
     first_row, first_force = layout.PAIR_SIDES.start + 4 * foot, layout.REACTION.start + 3 * foot
-    slip = layout.SLIP.start + foot
+    first_side, slip = layout.CONE_SIDES.start + 2 * foot, layout.SLIP.start + foot
 
     def row(which: int, low: float, high: float) -> None:
         bounds.lower_rows[first_row + which, where] = low
@@ -146,7 +148,9 @@ def _apply_mode(bounds: _Bounds, foot: int, mode: FootMode, where: NDArray[np.bo
             zero(first_force + force)
         zero(slip)
     elif mode is FootMode.STICK:
-        row(_CONE, 0.0, np.inf)
+        bounds.lower_rows[first_side : first_side + 2, where] = 0.0
+        bounds.lower[first_force + _FORWARD, where] = -np.inf
+        zero(first_force + _BACKWARD)
         row(_SLIP_PLUS, 0.0, 0.0)
         zero(slip)
     else:

@@ -45,7 +45,7 @@ def spring_units(walker: Sized) -> list[ca.SX]:
 
 
 def row_units(walker: Sized) -> list[ca.SX]:
-    """Return the unit of each row of a grid point's constraints, 28 values, in the order of the layout."""
+    """Return the unit of each row of a grid point's constraints, 32 values, in the order of the layout."""
     foot = [walker.leg_length, walker.weight, 1.0, 1.0]
     products = [walker.leg_length * walker.weight] + [walker.weight] * 3
-    return point_units(walker)[:12] + foot * 2 + products * 2
+    return point_units(walker)[:12] + foot * 2 + products * 2 + [walker.weight] * 4
