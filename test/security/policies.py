@@ -67,16 +67,37 @@ def _full(name, namespace, node):
     return f"{namespace}/{node}{name[1:]}" if name.startswith("~") else f"{namespace}/{name}"
 
 
-# Elements with their attributes and what they may contain: the format of policies, version 0.2.0.
+@dataclass(frozen=True)
+class Element:
+    """What the format of policies, version 0.2.0, says of an element.
+
+    Attributes:
+        children: Elements it may contain; none for those that contain a name.
+        required: Attributes it must have.
+        optional: Attributes it may have.
+        may_be_empty: Whether it may contain nothing.
+    """
+
+    children: frozenset[str] = frozenset()
+    required: frozenset[str] = frozenset()
+    optional: frozenset[str] = frozenset()
+    may_be_empty: bool = False
+
+
+def _element(children="", required="", optional="", **rest):
+    return Element(*(frozenset(names.split()) for names in (children, required, optional)), **rest)
+
+
 FORMAT = {
-    "policy": ({"version"}, {"enclaves"}),
-    "enclaves": (set(), {"enclave"}),
-    "enclave": ({"path"}, {"profiles"}),
-    "profiles": ({"type"}, {"profile", "metadata"}),
-    "profile": ({"ns", "node"}, set(RULES)),
-    **{kind: (set(rules), {kind[:-1]}) for kind, rules in RULES.items()},
-    **{kind[:-1]: (set(), set()) for kind in RULES},
+    "policy": _element("enclaves", required="version"),
+    "enclaves": _element("enclave"),
+    "enclave": _element("profiles", required="path"),
+    "profiles": _element("profile metadata", optional="type"),
+    "profile": _element(" ".join(RULES), required="ns node", may_be_empty=True),
+    **{kind: _element(kind[:-1], optional=" ".join(rules)) for kind, rules in RULES.items()},
+    **{kind[:-1]: _element() for kind in RULES},
 }
+VALUES = {"version": {"0.2.0"}} | {rule: {"ALLOW", "DENY"} for rules in RULES.values() for rule in rules}
 XML_BASE = "{http://www.w3.org/XML/1998/namespace}base"
 
 
@@ -84,12 +105,22 @@ def problems(element):
     """What of an element is not as the format says."""
     if element.tag not in FORMAT:
         return [f"unknown element {element.tag}"]
-    attributes, children = FORMAT[element.tag]
-    found = [f"{element.tag}: {name}" for name in set(element.keys()) - attributes - {XML_BASE}]
-    for child in element.iterchildren(tag=etree.Element):
-        if child.tag not in children:
-            found.append(f"{child.tag} in {element.tag}")
-        found += problems(child)
-    if not children and not (element.text or "").strip():
+    wanted, found = FORMAT[element.tag], _wrong_attributes(element)
+    children = list(element.iterchildren(tag=etree.Element))
+    found += [f"{child.tag} in {element.tag}" for child in children if child.tag not in wanted.children]
+    if wanted.children and not children and not wanted.may_be_empty:
+        found.append(f"{element.tag} without {' or '.join(sorted(wanted.children))}")
+    if not wanted.children and not (element.text or "").strip():
         found.append(f"{element.tag} without a name")
+    return found + [problem for child in children for problem in problems(child)]
+
+
+def _wrong_attributes(element):
+    wanted = FORMAT[element.tag]
+    found = [f"{element.tag} without {name}" for name in sorted(wanted.required - set(element.keys()))]
+    for name, value in element.items():
+        if name not in wanted.required | wanted.optional | {XML_BASE}:
+            found.append(f"{element.tag}: {name}")
+        elif value not in VALUES.get(name, {value}):
+            found.append(f"{element.tag}: {name}={value}")
     return found
