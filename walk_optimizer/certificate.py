@@ -129,6 +129,20 @@ def tread_entries(
     return [CertificateEntry("tread", abs(step_length - request.step_length), "m", _KINEMATIC_TOLERANCE)]
 
 
+def landing_speed_entries(walker: WalkerParameters, mechanics: Mechanics) -> list[CertificateEntry]:
+    """Return how much too slowly foot 2 comes down as the step ends; nothing where no speed is asked for.
+
+    Args:
+        walker: The walker.
+        mechanics: Its mechanics at points of the step, the last one where the step ends.
+    """
+    if not walker.landing_speed:
+        return []
+    normal = walker.terrain.along_and_normal(mechanics.foot_velocity(1)[:, -1])[1]
+    shortfall = _excess(walker.landing_speed + normal)
+    return [CertificateEntry("landing_speed", shortfall, "m/s", _KINEMATIC_TOLERANCE)]
+
+
 def certify(
     walker: WalkerParameters, request: GaitRequest, spring: KneeSpring, trajectory: Trajectory
 ) -> Certificate:
@@ -161,6 +175,7 @@ def certify(
         CertificateEntry("periodicity_force", _excess(np.abs(forces[:, :1])), load, force_tolerance),
         CertificateEntry("speed", _excess(shortfall), "m/s", _KINEMATIC_TOLERANCE),
         *tread_entries(walker, request, step_length),
+        *landing_speed_entries(walker, mechanics),
         *_contact_entries(walker, mechanics, trajectory, request.step_length),
         *_bound_entries(walker, trajectory),
         *spring_entries(walker, request.spring_mode, spring),

@@ -3,7 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.certificate import RELATIVE_TOLERANCE, spring_entries, tread_entries
+from walk_optimizer.certificate import (
+    RELATIVE_TOLERANCE,
+    landing_speed_entries,
+    spring_entries,
+    tread_entries,
+)
 from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
 from walk_optimizer.mechanics import Mechanics, along_and_normal, foot_arm, mechanics_at
 from walk_optimizer.model.kinematics import RELABELLED
@@ -48,6 +53,7 @@ def certify_refined(walker: WalkerParameters, request: GaitRequest, gait: Refine
         CertificateEntry("speed", largest(np.maximum(shortfall, 0.0)), "m/s", _TOLERANCE),
         CertificateEntry("landing", _landing_error(walker, request, gait), "m", _TOLERANCE),
         *tread_entries(walker, request, gait.step_length),
+        *landing_speed_entries(walker, mechanics),
         *contact_entries(walker, request.step_length, mechanics, forces),
         *bound_entries(walker, request.step_length, trajectory),
         *spring_entries(walker, request.spring_mode, gait.spring),

@@ -114,6 +114,7 @@ def test_limits_of_the_walker_that_the_gait_is_held_against(solved):
         ({"hip_angle_limit": 0.05}, {"joint_limits"}),
         ({"stiffness_limit": solved.spring.stiffness - 1}, {"stiffness_limits"}),
         ({"friction_coefficient": 0.01}, {"friction_cone"}),
+        ({"landing_speed": 2.0}, {"landing_speed"}),
     ):
         assert failures(solved, walker=replace(solved.walker, **limits)) == expected
 

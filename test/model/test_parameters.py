@@ -16,14 +16,22 @@ from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.model.terrain import Terrain
 
 FIELDS = [field.name for field in fields(WalkerParameters) if field.name != "terrain"]
+ABOVE_ZERO = [name for name in FIELDS if name != "landing_speed"]
 
 
-@pytest.mark.parametrize("name", FIELDS)
+@pytest.mark.parametrize("name", ABOVE_ZERO)
 @pytest.mark.parametrize("value", [0, -1.0, math.nan, math.inf])
 def test_impossible_numbers_are_refused_by_name(name, value):
     with pytest.raises(ConfigurationError) as refusal:
         WalkerParameters(**{name: value})
     assert f"{name} is {value}, allowed are finite numbers above 0" in str(refusal.value)
+
+
+@pytest.mark.parametrize("value", [-0.1, math.nan, math.inf])
+def test_a_landing_speed_is_0_or_above(value):
+    with pytest.raises(ConfigurationError, match=r"landing_speed is .+ 0 and finite numbers above"):
+        WalkerParameters(landing_speed=value)
+    assert WalkerParameters(landing_speed=0).landing_speed == 0
 
 
 @pytest.mark.parametrize("name", FIELDS)
@@ -48,7 +56,13 @@ def test_whole_numbers_become_floats_so_that_equal_walkers_have_equal_fingerprin
 @pytest.mark.parametrize("name", FIELDS)
 def test_every_parameter_changes_the_fingerprint(name):
     walker = WalkerParameters()
-    assert replace(walker, **{name: getattr(walker, name) * 1.01}).fingerprint() != walker.fingerprint()
+    changed = getattr(walker, name) * 1.01 or 0.1
+    assert replace(walker, **{name: changed}).fingerprint() != walker.fingerprint()
+
+
+def test_gaits_keep_the_names_that_they_had_before_walkers_had_a_terrain_and_a_landing_speed():
+    assert WalkerParameters().fingerprint() == "e3fd61db33fc207d"
+    assert WalkerParameters(landing_speed=-0.0).fingerprint() == WalkerParameters().fingerprint()
 
 
 def test_the_walker_of_the_report():

@@ -59,6 +59,7 @@ DYNAMIC_PARAMETERS = (
 )
 # What contact depends on besides: the terrain, and the length of its treads, which is that of the step.
 GROUND_PARAMETERS = ("slope", "step_up", "tread")
+_MAY_BE_ZERO = ("landing_speed",)
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,8 @@ class WalkerParameters:
         friction_coefficient: Coulomb friction mu of foot and ground [-].
         hip_angle_limit: Upper legs stay within plus and minus this angle in [rad].
         stiffness_limit: Largest knee stiffness K in [N m/rad].
+        landing_speed: Least speed towards the ground in [m/s] of the foot that lands as a step of a gait
+            ends; 0 sets no bound. The steps between gaits are not bound by it.
         terrain: The ground that it walks on.
     """
 
@@ -87,13 +90,15 @@ class WalkerParameters:
     friction_coefficient: float = 0.8
     hip_angle_limit: float = math.pi / 2
     stiffness_limit: float = 2000.0
+    landing_speed: float = 0.0
     terrain: Terrain = field(default_factory=Terrain)
 
     def __post_init__(self) -> None:
         """Refuse values that no walker can have."""
         for entry in fields(self):
             if entry.name != "terrain":
-                object.__setattr__(self, entry.name, _positive(entry.name, getattr(self, entry.name)))
+                value = _finite(entry.name, getattr(self, entry.name), zero=entry.name in _MAY_BE_ZERO)
+                object.__setattr__(self, entry.name, value)
         if abs(self.terrain.step_up) >= self.leg_length:
             raise ConfigurationError(
                 f"terrain step_up is {self.terrain.step_up} m, allowed is less than the leg's "
@@ -164,23 +169,34 @@ class WalkerParameters:
         return [*dynamic, self.terrain.slope, self.terrain.step_up, tread or 1.0]
 
     def fingerprint(self) -> str:
-        """Return a short hash of all parameters: equal walkers have equal fingerprints."""
+        """Return a short hash of all parameters: equal walkers have equal fingerprints.
+
+        What came to the parameters later is left out where it changes nothing: gaits keep their names.
+        """
         entries = asdict(self)
         if self.terrain.is_flat:
-            # As it was before walkers had a terrain: gaits on level ground keep their names.
             del entries["terrain"]
+        if not self.landing_speed:
+            del entries["landing_speed"]
         text = json.dumps(entries, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _positive(name: str, value: Any) -> float:
+def _finite(name: str, value: Any, *, zero: bool) -> float:
     """Return the value as a float.
 
+    Args:
+        name: Of the parameter.
+        value: What was given.
+        zero: Whether it may be 0.
+
     Raises:
-        ConfigurationError: it is no finite positive number.
+        ConfigurationError: it is no finite number above 0, or neither that nor 0.
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ConfigurationError(f"walker parameter {name} is {value!r}, expected a number{text_hint(value)}")
-    if not (math.isfinite(value) and value > 0):
-        raise ConfigurationError(f"walker parameter {name} is {value}, allowed are finite numbers above 0")
-    return float(value)
+    if not (math.isfinite(value) and (value > 0 or (zero and value == 0))):
+        allowed = "0 and finite numbers above" if zero else "finite numbers above 0"
+        raise ConfigurationError(f"walker parameter {name} is {value}, allowed are {allowed}")
+    # Adding 0.0 makes a zero of a negative zero.
+    return float(value) + 0.0

@@ -3,9 +3,11 @@
 from functools import cache
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
-from walk_optimizer.model.dynamics import velocity
-from walk_optimizer.model.ground import ground_height
+from walk_optimizer.model.dynamics import foot_jacobian, velocity
+from walk_optimizer.model.ground import along_and_normal, ground_height
 from walk_optimizer.model.kinematics import (
     HIP_X,
     HIP_Y,
@@ -16,11 +18,15 @@ from walk_optimizer.model.kinematics import (
     UPPER_2,
     foot_position,
 )
+from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.model.symbolic import SymbolicWalker
+from walk_optimizer.request import GaitRequest
 from walk_optimizer.transcription import layout
 from walk_optimizer.transcription.compilation import compiled
 from walk_optimizer.transcription.scaling import point_units
 from walk_optimizer.transcription.stage import Ends
+
+FloatArray = NDArray[np.float64]
 
 # Rows of q that hold joint angles.
 JOINT_ROWS = (UPPER_1, KNEE_1, UPPER_2, KNEE_2)
@@ -56,6 +62,26 @@ def periodic_functions() -> list[ca.Function]:
     That pins the walker's place. The one further row is the step length.
     """
     walker, z = SymbolicWalker(), ca.SX.sym("z", layout.STATE_WIDTH)
+    return end_functions("periodic", z, walker.symbols, _periodic_rows(walker, z))
+
+
+def landing_functions() -> list[ca.Function]:
+    """Return the periodic functions with one more row: the speed in [m/s] at which foot 2 comes down.
+
+    It is the component of -J_2 qdot normal to the ground, just before the impact.
+    """
+    walker, z = SymbolicWalker(), ca.SX.sym("z", layout.STATE_WIDTH)
+    q, p = ca.SX.sym("q", 6), ca.SX.sym("p", 6)
+    foot_velocity = ca.mtimes(foot_jacobian(walker, q, 1), velocity(walker, q, p))
+    towards_ground = -along_and_normal(walker, foot_velocity)[1]
+    physical = z * ca.vertcat(*point_units(walker)[: layout.STATE_WIDTH])
+    speed = ca.substitute(towards_ground, ca.vertcat(q, p), physical)
+    rows = ca.vertcat(_periodic_rows(walker, z), speed)
+    return end_functions("landing", z, walker.symbols, rows)
+
+
+def _periodic_rows(walker: SymbolicWalker, z: ca.SX) -> ca.SX:
+    """Return the state handed to the first stage and the step length, scaled, (13,)."""
     units = ca.vertcat(*point_units(walker)[: layout.STATE_WIDTH])
     physical = z * units
     q, p = physical[layout.Q], physical[layout.P]
@@ -64,8 +90,7 @@ def periodic_functions() -> list[ca.Function]:
     relabelled[HIP_X] -= step_length
     relabelled[HIP_Y] -= ground_height(walker, step_length)
     state = ca.vertcat(relabelled, p[list(RELABELLED)]) / units
-    rows = ca.vertcat(state, step_length / walker.leg_length)
-    return end_functions("periodic", z, walker.symbols, rows)
+    return ca.vertcat(state, step_length / walker.leg_length)
 
 
 def given_start_functions() -> list[ca.Function]:
@@ -86,9 +111,28 @@ def given_start_functions() -> list[ca.Function]:
 
 
 @cache
-def periodic_ends() -> Ends:
-    """Return the ends of a step that is repeated with the legs relabelled."""
+def periodic_ends(*, landing: bool = False) -> Ends:
+    """Return the ends of a step that is repeated with the legs relabelled.
+
+    Args:
+        landing: Whether the speed at which foot 2 comes down is a row, behind the step length.
+    """
+    if landing:
+        return Ends("landing", compiled(landing_functions))
     return Ends("periodic", compiled(periodic_functions))
+
+
+def periodic_bounds(request: GaitRequest, walker: WalkerParameters) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of the further rows of a step's periodic ends.
+
+    The step length is in leg lengths; on stairs a step is as long as a tread. Landing speeds are a row
+    of walkers that bound them.
+    """
+    shortest = request.step_length / walker.leg_length
+    longest = shortest if walker.terrain.step_up else np.inf
+    if not walker.landing_speed:
+        return np.array([shortest]), np.array([longest])
+    return np.array([shortest, walker.landing_speed]), np.array([longest, np.inf])
 
 
 @cache

@@ -10,7 +10,7 @@ from walk_optimizer.model.kinematics import KNEE_1, KNEE_2, UPPER_1, UPPER_2
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.transcription import layout
-from walk_optimizer.transcription.boundary import periodic_ends
+from walk_optimizer.transcription.boundary import periodic_bounds, periodic_ends
 from walk_optimizer.transcription.chain import assemble
 from walk_optimizer.transcription.euler_stage import euler_kind
 from walk_optimizer.transcription.program import Nlp, Problem
@@ -39,10 +39,11 @@ def from_scaled(walker: WalkerParameters, x: FloatArray) -> tuple[FloatArray, Kn
 
 
 @lru_cache(maxsize=16)
-def _assembled(rows: bytes, points: int) -> Nlp:
+def _assembled(rows: bytes, points: int, landing: bool) -> Nlp:
     kept = np.frombuffer(rows, dtype=bool).reshape(layout.ROW_WIDTH, points)
     stages = [Stage(euler_kind(), (0, 1), kept[:, point]) for point in range(points)]
-    return assemble(stages, periodic_ends(), layout.SPRING_WIDTH, np.zeros((0, layout.SPRING_WIDTH)))
+    ends = periodic_ends(landing=landing)
+    return assemble(stages, ends, layout.SPRING_WIDTH, np.zeros((0, layout.SPRING_WIDTH)))
 
 
 def state_bounds(walker: WalkerParameters) -> tuple[FloatArray, FloatArray]:
@@ -77,12 +78,6 @@ def spring_bounds(mode: SpringMode, walker: WalkerParameters) -> tuple[KneeSprin
     return KneeSpring(equilibrium=0.0), KneeSpring(stiffness=walker.stiffness_limit)
 
 
-def step_length_bounds(request: GaitRequest, walker: WalkerParameters) -> tuple[float, float]:
-    """Return the bounds of the step length in leg lengths: on stairs a step is as long as a tread."""
-    shortest = request.step_length / walker.leg_length
-    return shortest, shortest if walker.terrain.step_up else np.inf
-
-
 class _Bounds:
     """Bounds under construction: points (23, N) and rows (28, N); a row without bounds is left out."""
 
@@ -99,14 +94,14 @@ class _Bounds:
         low, high = spring_bounds(self.request.spring_mode, self.walker)
         kept = rows.ravel(order="F")
         intervals = np.full(self.request.points, self.request.interval)
-        shortest, longest = step_length_bounds(self.request, self.walker)
+        end_low, end_high = periodic_bounds(self.request, self.walker)
         return Problem(
-            nlp=_assembled(rows.tobytes(), self.request.points),
+            nlp=_assembled(rows.tobytes(), self.request.points, self.walker.landing_speed > 0),
             parameters=np.concatenate([self.walker.vector(self.request.step_length), intervals]),
             lower_x=to_scaled(self.walker, self.lower, low),
             upper_x=to_scaled(self.walker, self.upper, high),
-            lower_g=np.append(self.lower_rows.ravel(order="F")[kept], shortest),
-            upper_g=np.append(self.upper_rows.ravel(order="F")[kept], longest),
+            lower_g=np.append(self.lower_rows.ravel(order="F")[kept], end_low),
+            upper_g=np.append(self.upper_rows.ravel(order="F")[kept], end_high),
         )
 
 

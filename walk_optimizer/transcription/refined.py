@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.transcription import radau
-from walk_optimizer.transcription.boundary import periodic_ends
+from walk_optimizer.transcription.boundary import periodic_bounds, periodic_ends
 from walk_optimizer.transcription.chain import assemble
 from walk_optimizer.transcription.layout import STATE_WIDTH
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
 from walk_optimizer.transcription.phase_bounds import PhaseLayout, kept_rows, stage_bounds
 from walk_optimizer.transcription.phases import Landing
-from walk_optimizer.transcription.problems import spring_bounds, step_length_bounds
+from walk_optimizer.transcription.problems import spring_bounds
 from walk_optimizer.transcription.program import Nlp, Problem
 from walk_optimizer.transcription.refined_variables import SPRING_VARIABLES, RefinedVariables
 from walk_optimizer.transcription.scaling import point_units
@@ -43,14 +43,14 @@ class RefinedProblem:
         rows = chain_bounds(layout, _landing(layout))
         lower, upper = self.variables.bounds(spring_bounds(self.request.spring_mode, self.walker))
         vector = self.walker.vector(self.request.step_length)
-        shortest, longest = step_length_bounds(self.request, self.walker)
+        end_low, end_high = periodic_bounds(self.request, self.walker)
         return Problem(
-            nlp=_assembled(layout),
+            nlp=_assembled(layout, self.walker.landing_speed > 0),
             parameters=np.concatenate([vector, self.variables.own_numbers()]),
             lower_x=lower,
             upper_x=upper,
-            lower_g=np.concatenate([rows[0], [shortest, self.request.step_time]]),
-            upper_g=np.concatenate([rows[1], [longest, self.request.step_time]]),
+            lower_g=np.concatenate([rows[0], end_low, [self.request.step_time]]),
+            upper_g=np.concatenate([rows[1], end_high, [self.request.step_time]]),
         )
 
     def pack(self, points: RefinedPoints) -> FloatArray:
@@ -85,12 +85,12 @@ def _landing(layout: PhaseLayout) -> Landing:
 
 
 @lru_cache(maxsize=16)
-def _assembled(layout: PhaseLayout) -> Nlp:
-    """Return the program of phases with their numbers of intervals."""
+def _assembled(layout: PhaseLayout, landing: bool) -> Nlp:
+    """Return the program of phases with their numbers of intervals, `landing` speeds being a row or not."""
     stages = phase_stages(layout, _landing(layout))
     shared = len(SPRING_VARIABLES)
     durations = np.concatenate([np.zeros(shared), np.ones(len(layout))])
-    return assemble(stages, periodic_ends(), durations.size, durations[None])
+    return assemble(stages, periodic_ends(landing=landing), durations.size, durations[None])
 
 
 def phase_stages(layout: PhaseLayout, landing: Landing) -> list[Stage]:
