@@ -24,13 +24,17 @@ _STATUS = {
     "Invalid_Number_Detected": Status.EVALUATION_ERROR,
 }
 
+# First barrier parameter for a start that may be far from a solution. From kinematic guesses larger ones,
+# and IPOPT's adaptive choice, end in worse optima more often, and some solves take several times as long.
+_FAR_BARRIER = 1e-4
+
 
 @dataclass(frozen=True)
 class IpoptOptions(SolveOptions):
     """Options of a solve by IPOPT alone.
 
     Attributes:
-        further: Names and values of IPOPT's own options, which come last.
+        further: Names and values of IPOPT's own options, in place of ours for the barrier parameter.
     """
 
     further: tuple[tuple[str, str | float], ...] = ()
@@ -57,20 +61,23 @@ def _settings(options: SolveOptions) -> dict[str, Any]:
         "sb": "yes",
         "tol": options.tolerance,
         "max_iter": options.maximum_iterations,
-        "mu_strategy": "adaptive",
         # By default every bound is widened by 1e-8, and solutions make use of it.
         "bound_relax_factor": 0.0,
         # Solutions are refined where their residual asks for it, not always.
         "min_refinement_steps": 0,
         **_linear_solver(),
     }
-    if options.barrier is not None:
-        push = min(1e-6, 10 * options.barrier)
-        settings |= {"mu_strategy": "monotone", "mu_init": options.barrier}
-        settings |= {"bound_push": push, "bound_frac": push}
     if isinstance(options, IpoptOptions):
-        settings |= dict(options.further)
-    return settings
+        return settings | dict(options.further)
+    return settings | _strategy(options.barrier)
+
+
+def _strategy(barrier: float | None) -> dict[str, Any]:
+    """Return how the barrier parameter goes down from its first value, None for a start that may be far."""
+    if barrier is None:
+        return {"mu_strategy": "monotone", "mu_init": _FAR_BARRIER, "expect_infeasible_problem": "yes"}
+    push = min(1e-6, 10 * barrier)
+    return {"mu_strategy": "monotone", "mu_init": barrier, "bound_push": push, "bound_frac": push}
 
 
 class _Instance:
