@@ -4,9 +4,9 @@ import math
 import os
 import sys
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 
 import yaml
 
@@ -61,8 +61,10 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return {str(name): value for name, value in content.items()}
 
 
-def settings_from_entries(kind: Callable[..., Settings], entries: dict[str, Any], source: Path) -> Settings:
-    """Return what `kind` makes of the entries of a file; its own refusals then name the file.
+def settings_from_entries(
+    kind: Callable[..., Settings], entries: dict[str, Any], where: Path | str
+) -> Settings:
+    """Return what `kind` makes of entries; its own refusals then name the file, or the part of a file.
 
     Raises:
         ConfigurationError: it refuses an entry.
@@ -70,20 +72,43 @@ def settings_from_entries(kind: Callable[..., Settings], entries: dict[str, Any]
     try:
         return kind(**entries)
     except ConfigurationError as error:
-        raise ConfigurationError(f"{source}: {error}") from error
+        raise ConfigurationError(f"{where}: {error}") from error
 
 
 def settings_from_yaml(kind: type[Settings], source: Path) -> Settings:
     """Return the dataclass of settings that a YAML file holds in full.
 
+    A field that is a dataclass itself is a mapping in the file.
+
     Raises:
         ConfigurationError: the file can't be read, or an entry is missing, unknown or impossible.
     """
-    entries = read_yaml(source)
-    wrong = sorted(set(entries) ^ {field.name for field in fields(kind)})  # type: ignore[arg-type]
+    return _complete(kind, read_yaml(source), str(source))
+
+
+def _complete(kind: type[Settings], entries: Any, where: str) -> Settings:
+    """Return the dataclass that a mapping holds in full, and so those within it.
+
+    Args:
+        kind: The dataclass.
+        entries: What the file holds there.
+        where: The file, and the part of it, for messages.
+
+    Raises:
+        ConfigurationError: it is no mapping, or an entry is missing, unknown or impossible.
+    """
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    if not isinstance(entries, dict):
+        raise ConfigurationError(f"{where} is {entries!r}, expected entries {', '.join(names)}")
+    wrong = sorted({str(name) for name in entries} ^ set(names))
     if wrong:
-        raise ConfigurationError(f"{source}: missing or unknown entries: {', '.join(wrong)}")
-    return settings_from_entries(kind, entries, source)
+        raise ConfigurationError(f"{where}: missing or unknown entries: {', '.join(wrong)}")
+    hints = get_type_hints(kind)
+    values = {
+        name: _complete(hints[name], value, f"{where}: {name}") if is_dataclass(hints[name]) else value
+        for name, value in entries.items()
+    }
+    return settings_from_entries(kind, values, where)
 
 
 def require_positive(settings: Any, label: str = "") -> None:

@@ -26,7 +26,12 @@ def test_a_fall_is_told_with_its_step_and_reason(tmp_path):
 
 @pytest.mark.parametrize(
     ("option", "value", "named"),
-    [("--steps", "0", "steps"), ("--push", "nan", "push"), ("--heavier", "-100", "heavier")],
+    [
+        ("--steps", "0", "steps is '0', allowed are whole numbers from 1 to 1000"),
+        ("--push", "nan", "push is 'nan', allowed are finite numbers, in N s"),
+        ("--heavier", "-100", "heavier is '-100', allowed are finite numbers above -100, in %"),
+        ("--friction", "0", "friction is '0', allowed are finite numbers above 0, without unit"),
+    ],
 )
 def test_impossible_numbers_are_refused(option, value, named, tmp_path):
     done = walk_optimizer("simulate", *GAIT, option, value, home=tmp_path)

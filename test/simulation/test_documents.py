@@ -37,7 +37,9 @@ def test_impossible_settings_are_refused_with_their_name(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "config_file", lambda _: wrong)
     for text, named in (
         (packaged.replace("steps: 20", "steps: 0"), "steps"),
-        (packaged.replace("  damping: 1.0", "  bounce: 1.0"), "knee_stop"),
+        (packaged.replace("  damping: 1.0", "  bounce: 1.0"), "knee_stop: .*entries: bounce, damping"),
+        (packaged.split("weights:")[0] + "weights: 3\n", "weights is 3, expected entries angle, speed"),
+        (packaged.replace("  angle: 0.05", "  angle: 0.0"), "angle is 0.0"),
         (packaged.replace("lowest_hip: 0.6", "lowest_hip: 1.5"), "lowest_hip"),
         (packaged + "more: 1\n", "more"),
     ):

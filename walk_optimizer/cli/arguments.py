@@ -1,6 +1,7 @@
 """Options that several verbs share, and what they mean to the core."""
 
 import argparse
+import math
 from pathlib import Path
 from typing import TypeAlias
 
@@ -79,12 +80,32 @@ def parse_points(text: str) -> int:
     Raises:
         InvalidRequestError: the text is no whole number.
     """
+    points = _whole(text)
+    if points is None:
+        settings = gait_table_settings()
+        allowed = f"{settings.minimum_points} to {settings.maximum_points}"
+        raise InvalidRequestError(f"N is {text!r} grid points, allowed is {allowed}")
+    return points
+
+
+def parse_count(text: str, name: str, most: int) -> int:
+    """Return a number of things.
+
+    Raises:
+        InvalidRequestError: the text is no whole number from 1 to `most`.
+    """
+    count = _whole(text)
+    if count is None or not 1 <= count <= most:
+        raise InvalidRequestError(f"{name} is {text!r}, allowed are whole numbers from 1 to {most}")
+    return count
+
+
+def _whole(text: str) -> int | None:
+    """Return a whole number; None where the text is none."""
     try:
         return int(text)
     except ValueError:
-        settings = gait_table_settings()
-        allowed = f"{settings.minimum_points} to {settings.maximum_points}"
-        raise InvalidRequestError(f"N is {text!r} grid points, allowed is {allowed}") from None
+        return None
 
 
 def positive_seconds(text: str) -> float:
@@ -93,10 +114,26 @@ def positive_seconds(text: str) -> float:
     Raises:
         InvalidRequestError: the text is no finite number above 0.
     """
+    return parse_number(text, "time limit", "in s", above=0.0)
+
+
+def parse_number(text: str, name: str, unit: str, above: float = -math.inf) -> float:
+    """Return a finite number.
+
+    Args:
+        text: What was typed.
+        name: Of the quantity, for messages.
+        unit: What follows in a message, as "in s".
+        above: What it must be larger than.
+
+    Raises:
+        InvalidRequestError: the text is no such number.
+    """
     try:
-        seconds = float(text)
+        value = float(text)
     except ValueError:
-        seconds = float("nan")
-    if not 0 < seconds < float("inf"):
-        raise InvalidRequestError(f"time limit is {text!r}, allowed are finite numbers above 0, in s")
-    return seconds
+        value = math.nan
+    if not above < value < math.inf:
+        least = f" above {above:g}" if math.isfinite(above) else ""
+        raise InvalidRequestError(f"{name} is {text!r}, allowed are finite numbers{least}, {unit}")
+    return value

@@ -1,12 +1,10 @@
 """`simulate`: a gait in closed loop over many steps."""
 
 import argparse
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from walk_optimizer.cli.arguments import Subparsers, add_gait_choice, add_verb
-from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.cli.arguments import Subparsers, add_gait_choice, add_verb, parse_count, parse_number
 
 if TYPE_CHECKING:
     from walk_optimizer.gait import Gait
@@ -29,7 +27,9 @@ examples:
         a push forward on the hip, in N s, in the third step
   walk-optimizer simulate --speed 1.5km/h --spring stiffness --step-down 0.005 --picture walk.png
   walk-optimizer simulate --table
-        all gaits of the table with all disturbances; takes a quarter of an hour"""
+        all gaits of the table with all disturbances; takes a quarter of an hour
+  walk-optimizer simulate --table --walker my_walker.yaml --library my_table --friction 0.8
+        those of another walker, on ground with this friction"""
 
 
 def add_parser(verbs: Subparsers) -> None:
@@ -62,11 +62,10 @@ def run(args: argparse.Namespace) -> int:
     """Walk, and say how it went."""
     if args.table:
         return _print_table(args)
-    steps = _steps(args.steps)
-    push, down = _number(args.push, "push", "N s"), _number(args.step_down, "step down", "m")
-    heavier = _number(args.heavier, "heavier", "%")
-    if heavier <= -100:
-        raise InvalidRequestError(f"heavier is {heavier:g} %, allowed is more than -100")
+    push = parse_number(args.push, "push", "in N s")
+    down = parse_number(args.step_down, "step down", "in m")
+    heavier = parse_number(args.heavier, "heavier", "in %", above=-100.0)
+    friction = _friction(args)
 
     from walk_optimizer.cli.gaits import chosen_gait
     from walk_optimizer.figures import picture_target
@@ -75,10 +74,12 @@ def run(args: argparse.Namespace) -> int:
 
     if args.picture is not None:
         picture_target(args.picture)
+    settings = simulation_settings()
+    steps = settings.steps if args.steps is None else parse_count(args.steps, "steps", _MOST_STEPS)
     gait = chosen_gait(args)
-    loop = closed_loop(gait, simulation_settings()).heavier(1 + heavier / 100)
-    if args.friction is not None:
-        loop = loop.on_ground(_number(args.friction, "friction", "-"))
+    loop = closed_loop(gait, settings).heavier(1 + heavier / 100)
+    if friction is not None:
+        loop = loop.on_ground(friction)
     disturbance = loop.disturbance(push, down)
     walk = loop.walk_without_feedback(steps) if args.without_feedback else loop.walk(steps, disturbance)
     print(_text(gait, loop, walk, steps))
@@ -123,50 +124,20 @@ def _text(gait: "Gait", loop: "ClosedLoop", walk: "SimulatedWalk", steps: int) -
 def _print_table(args: argparse.Namespace) -> int:
     """Print the table row by row."""
     from walk_optimizer.cli.arguments import walker_from
+    from walk_optimizer.cli.text import markdown_line
     from walk_optimizer.library import GaitLibrary
     from walk_optimizer.simulation.settings import simulation_settings
     from walk_optimizer.simulation.table import HEADINGS, table_rows
 
-    library = GaitLibrary(walker_from(args), args.library)
-    print(_markdown(HEADINGS), _markdown(["---"] * len(HEADINGS)), sep="\n")
-    for row in table_rows(library, simulation_settings()):
-        print(_markdown(row), flush=True)
+    friction, library = _friction(args), GaitLibrary(walker_from(args), args.library)
+    print(markdown_line(HEADINGS), markdown_line(["---"] * len(HEADINGS)), sep="\n")
+    for row in table_rows(library, simulation_settings(), friction):
+        print(markdown_line(row), flush=True)
     return 0
 
 
-def _markdown(cells: "tuple[str, ...] | list[str]") -> str:
-    return f"| {' | '.join(cells)} |"
-
-
-def _steps(text: str | None) -> int:
-    """Return a number of steps.
-
-    Raises:
-        InvalidRequestError: it is no whole number within bounds.
-    """
-    from walk_optimizer.simulation.settings import simulation_settings
-
-    if text is None:
-        return simulation_settings().steps
-    try:
-        steps = int(text)
-    except ValueError:
-        steps = 0
-    if not 1 <= steps <= _MOST_STEPS:
-        raise InvalidRequestError(f"steps is {text!r}, allowed are whole numbers from 1 to {_MOST_STEPS}")
-    return steps
-
-
-def _number(text: str, name: str, unit: str) -> float:
-    """Return a finite number.
-
-    Raises:
-        InvalidRequestError: it is none.
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InvalidRequestError(f"{name} is {text!r}, allowed are finite numbers, in {unit}")
-    return value
+def _friction(args: argparse.Namespace) -> float | None:
+    """Return the friction coefficient of the ground; None for that of the gait's walker."""
+    return (
+        None if args.friction is None else parse_number(args.friction, "friction", "without unit", above=0.0)
+    )

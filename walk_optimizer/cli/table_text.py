@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from walk_optimizer.cli.text import aligned, cost, number
+from walk_optimizer.cli.text import aligned, cost, markdown_line, number
 from walk_optimizer.errors import GaitNotFoundError
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import KneeSpring, SpringMode
@@ -63,7 +63,7 @@ def markdown_table(library: GaitLibrary, *, refined: bool = False) -> str:
         columns.append([f"{mode.value}: {', '.join(head)}", "---", *map(", ".join, marked)])
         head, *theirs = _report_rows(reported)
         columns.append([f"report: {', '.join(head)}", "---", *map(", ".join, theirs)])
-    return "\n".join(f"| {' | '.join(line)} |" for line in zip(*columns, strict=True))
+    return "\n".join(markdown_line(line) for line in zip(*columns, strict=True))
 
 
 def _marked(row: Sequence[str], reported: ReportResult) -> list[str]:

@@ -99,6 +99,11 @@ def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = ()) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
+def markdown_line(cells: Sequence[str]) -> str:
+    """Return a line of a table in Markdown."""
+    return f"| {' | '.join(cells)} |"
+
+
 def number(value: float, pattern: str) -> str:
     """Return a number, or a dash where there is none."""
     return "-" if math.isnan(value) else format(value, pattern)

@@ -1,10 +1,10 @@
 """Settings of the simulated walk (config/simulation.yaml)."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 
 from walk_optimizer.errors import ConfigurationError
-from walk_optimizer.resources import config_file, read_yaml, require_positive, settings_from_entries
+from walk_optimizer.resources import config_file, require_positive, settings_from_yaml
 
 
 @dataclass(frozen=True)
@@ -88,15 +88,4 @@ def simulation_settings() -> SimulationSettings:
     Raises:
         ConfigurationError: an entry is missing, unknown or impossible.
     """
-    source = config_file("simulation.yaml")
-    entries = read_yaml(source)
-    for name, kind in (("knee_stop", KneeStop), ("weights", RegulatorWeights)):
-        nested = entries.get(name)
-        if not isinstance(nested, dict) or set(nested) != {field.name for field in fields(kind)}:
-            expected = ", ".join(field.name for field in fields(kind))
-            raise ConfigurationError(f"{source}: {name} is {nested!r}, expected entries {expected}")
-        entries[name] = kind(**nested)
-    wrong = sorted(set(entries) ^ {field.name for field in fields(SimulationSettings)})
-    if wrong:
-        raise ConfigurationError(f"{source}: missing or unknown entries: {', '.join(wrong)}")
-    return settings_from_entries(SimulationSettings, entries, source)
+    return settings_from_yaml(SimulationSettings, config_file("simulation.yaml"))

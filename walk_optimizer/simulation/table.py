@@ -25,14 +25,23 @@ HEADINGS = (
 )
 
 
-def table_rows(library: GaitLibrary, settings: SimulationSettings) -> Iterator[tuple[str, ...]]:
-    """Return a row for each gait of the table, one after the other: each takes a minute."""
+def table_rows(
+    library: GaitLibrary, settings: SimulationSettings, friction: float | None = None
+) -> Iterator[tuple[str, ...]]:
+    """Return a row for each gait of the table, one after the other: each takes a minute.
+
+    Args:
+        library: The gaits.
+        settings: Of the walks.
+        friction: Coefficient of the ground [-]; that of the gaits' walker by default.
+    """
     points = gait_table_settings().points
     speeds = gait_table_settings().table_speeds()
     for gait in library.gaits():
         of_table = any(abs(gait.request.speed - speed) < 1e-9 for speed in speeds)
         if of_table and gait.request.points == points:
             loop = closed_loop(gait, settings)
+            loop = loop if friction is None else loop.on_ground(friction)
             names = (f"{gait.speed * KMH_PER_MS:.2f}", gait.request.spring_mode.value)
             yield *names, *orbit_cells(loop), *robustness_cells(robustness(loop, settings.steps))
 
