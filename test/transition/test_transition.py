@@ -14,6 +14,7 @@ from walk_optimizer.profile import RefinedProfile, join_error
 from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transition.builder import recomputed
+from walk_optimizer.transition.certificate import certify_steps
 from walk_optimizer.transition.paces import refined_of
 from walk_optimizer.transition.solve import plan_transition
 from walk_optimizer.transition.transition import Transition
@@ -65,6 +66,24 @@ def test_its_certificate_holds_and_is_that_of_its_steps(solved):
     assert solved.certificate.certified
     assert all(step.certificate.certified for step in solved.steps)
     assert recomputed(solved) == solved.certificate
+
+
+def landing_speed(walker, step):
+    """Speed of foot 2 towards level ground as a step ends, in [m/s]."""
+    state = step.trajectory.states[-1, -1][:, None]
+    return -mechanics_at(walker, step.spring, state[:6], state[6:]).foot_velocity(1)[1, 0]
+
+
+def test_steps_on_the_way_land_as_fast_as_the_walker_asks(solved):
+    first = solved.steps[0]
+    walker = replace(solved.walker, landing_speed=landing_speed(solved.walker, first) + 0.1)
+    _, refused = certify_steps(walker, solved.source, solved.target, solved.steps, solved.torque_limit)
+    assert [entry.family for entry in refused.failures()] == ["landing_speed"]
+    source, target = (replace(gait, walker=walker) for gait in (solved.source, solved.target))
+    outcome = plan_transition(walker, source, target, steps=len(solved.steps))
+    assert outcome.transition is not None, outcome.report.message
+    landing = landing_speed(walker, outcome.transition.steps[0])
+    assert landing == pytest.approx(walker.landing_speed, abs=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -76,8 +76,8 @@ class WalkerParameters:
         friction_coefficient: Coulomb friction mu of foot and ground [-].
         hip_angle_limit: Upper legs stay within plus and minus this angle in [rad].
         stiffness_limit: Largest knee stiffness K in [N m/rad].
-        landing_speed: Least speed towards the ground in [m/s] of the foot that lands as a step of a gait
-            ends; 0 sets no bound. The steps between gaits are not bound by it.
+        landing_speed: Least speed towards the ground in [m/s] of the foot that lands as a step ends; 0 sets
+            no bound. The last step to a stand, which sets its foot down softly, is not bound by it.
         terrain: The ground that it walks on.
     """
 

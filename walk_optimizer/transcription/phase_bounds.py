@@ -27,16 +27,21 @@ def kept_rows(bounds: RowBounds) -> NDArray[np.bool_]:
     return np.isfinite(bounds[0]) | np.isfinite(bounds[1])
 
 
-def stage_bounds(layout: PhaseLayout, landing: Landing) -> list[RowBounds]:
+def stage_bounds(layout: PhaseLayout, landing: Landing, landing_speed: float = 0.0) -> list[RowBounds]:
     """Return the bounds of each stage's rows: of each phase its impact, where it has one, and intervals.
 
     Args:
         layout: The phases.
         landing: Which feet land at the end of the last one.
+        landing_speed: Least speed towards the ground in [m/s] of feet that land in the impacts between
+            phases; 0 sets no bound. What the last phase ends in is for the ends of the chain to bound.
     """
     bounds: list[RowBounds] = []
     phases = [phase for phase, _ in layout]
-    landings = [*((phase.landing, phase.begins_with_impact) for phase in phases[1:]), (landing, True)]
+    landings = [
+        *((phase.landing, phase.begins_with_impact, landing_speed) for phase in phases[1:]),
+        (landing, True, 0.0),
+    ]
     stops = [*(_stopping(*pair) for pair in pairwise(phases)), (False, False)]
     for (phase, intervals), after, stopping in zip(layout, landings, stops, strict=True):
         bounds += [impact_bounds(phase)] * phase.begins_with_impact
@@ -71,8 +76,8 @@ def interval_bounds(modes: Modes) -> RowBounds:
     return low, high
 
 
-def _ended(bounds: RowBounds, landing: Landing, with_impact: bool) -> RowBounds:
-    """Return the bounds of an interval at the end of which feet land.
+def _ended(bounds: RowBounds, landing: Landing, with_impact: bool, speed: float) -> RowBounds:
+    """Return the bounds of an interval at the end of which feet land, in an impact at least at a speed.
 
     What follows pins the gap of a landing foot, an impact or else the end of the chain: the last node
     must not bound it once more. Without an impact the foot is set down, and at rest there.
@@ -84,6 +89,8 @@ def _ended(bounds: RowBounds, landing: Landing, with_impact: bool) -> RowBounds:
         if not with_impact:
             for row in (_TANGENTIAL + foot, _NORMAL + foot):
                 last_low[row] = last_high[row] = 0.0
+        elif speed:
+            last_high[_NORMAL + foot] = -speed
     return low, high
 
 

@@ -93,9 +93,9 @@ def _assembled(layout: PhaseLayout, landing: bool) -> Nlp:
     return assemble(stages, periodic_ends(landing=landing), durations.size, durations[None])
 
 
-def phase_stages(layout: PhaseLayout, landing: Landing) -> list[Stage]:
-    """Return the stages of phases with their numbers of intervals, `landing` telling which feet end them."""
-    kept = (kept_rows(bounds) for bounds in stage_bounds(layout, landing))
+def phase_stages(layout: PhaseLayout, landing: Landing, landing_speed: float = 0.0) -> list[Stage]:
+    """Return the stages of phases with their numbers of intervals; arguments as for `stage_bounds`."""
+    kept = (kept_rows(bounds) for bounds in stage_bounds(layout, landing, landing_speed))
     stages = []
     for index, (phase, intervals) in enumerate(layout):
         if phase.begins_with_impact:
@@ -105,8 +105,10 @@ def phase_stages(layout: PhaseLayout, landing: Landing) -> list[Stage]:
     return stages
 
 
-def chain_bounds(layout: PhaseLayout, landing: Landing) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of the kept rows of all stages."""
-    bounds = stage_bounds(layout, landing)
+def chain_bounds(
+    layout: PhaseLayout, landing: Landing, landing_speed: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of the kept rows of all stages; arguments as for `stage_bounds`."""
+    bounds = stage_bounds(layout, landing, landing_speed)
     lower, upper = (np.concatenate([one[side][kept_rows(one)] for one in bounds]) for side in range(2))
     return lower, upper

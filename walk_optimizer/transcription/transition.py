@@ -70,7 +70,8 @@ class TransitionLimits:
 class TransitionProblem:
     """The problem of one or more steps from a given state to another.
 
-    All steps are one chain, in which the legs keep their names: in the second step foot 2 stands.
+    All steps are one chain, in which the legs keep their names: in the second step foot 2 stands. Each
+    step but the last ends in a landing at the walker's landing speed or faster; the last one's end is given.
     """
 
     def __init__(
@@ -101,7 +102,7 @@ class TransitionProblem:
 
     def problem(self) -> Problem:
         """Return the program with its bounds."""
-        rows = chain_bounds(self.mesh.layout, self.end.landing)
+        rows = chain_bounds(self.mesh.layout, self.end.landing, self.walker.landing_speed)
         end, steps = self.end.bounds(), len(self.steps)
         lower, upper = self.variables.bounds((self.spring, self.spring), self.limits.torque)
         # The end pins what these would bound.
@@ -109,7 +110,7 @@ class TransitionProblem:
         lower[last], upper[last] = -np.inf, np.inf
         numbers = (self.walker.vector(), self.variables.own_numbers(), self.start / self.variables.state_unit)
         return Problem(
-            nlp=_assembled(self.mesh.layout, self.steps, self.end.landing),
+            nlp=_assembled(self.mesh.layout, self.steps, self.end.landing, self.walker.landing_speed),
             parameters=np.concatenate(numbers),
             lower_x=lower,
             upper_x=upper,
@@ -127,10 +128,11 @@ class TransitionProblem:
 
 
 @lru_cache(maxsize=16)
-def _assembled(layout: PhaseLayout, steps: tuple[int, ...], landing: Landing) -> Nlp:
+def _assembled(layout: PhaseLayout, steps: tuple[int, ...], landing: Landing, landing_speed: float) -> Nlp:
     """Return the program of phases and numbers of intervals; the durations of steps are its linear rows."""
     step_of_phase = np.repeat(np.arange(len(steps)), steps)
     durations = (step_of_phase == np.arange(len(steps))[:, None]).astype(float)
     spring = np.zeros((len(steps), len(SPRING_VARIABLES)))
     shared = np.hstack([spring, durations])
-    return assemble(phase_stages(layout, landing), given_start_ends(), shared.shape[1], shared)
+    stages = phase_stages(layout, landing, landing_speed)
+    return assemble(stages, given_start_ends(), shared.shape[1], shared)

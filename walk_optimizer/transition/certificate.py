@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from walk_optimizer.certificate import landing_speed_entries
 from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
 from walk_optimizer.mechanics import mechanics_at
 from walk_optimizer.model.kinematics import HIP_X, HIP_Y
@@ -63,7 +64,7 @@ def certify_steps(
         return tuple(steps), Certificate((CertificateEntry("finite", np.inf, "-", 0.0),))
     before, certified = border_state(source), []
     for step in steps:
-        entries = _step_entries(walker, step, before, torque_limit)
+        entries = _step_entries(walker, step, before, torque_limit, is_last=step is steps[-1])
         if replay:
             entries.append(_replay_entry(walker, step))
         certified.append(replace(step, certificate=Certificate(tuple(entries))))
@@ -78,9 +79,9 @@ def certify_steps(
 
 
 def _step_entries(
-    walker: WalkerParameters, step: RefinedGait, before: FloatArray, torque_limit: float
+    walker: WalkerParameters, step: RefinedGait, before: FloatArray, torque_limit: float, *, is_last: bool
 ) -> list[CertificateEntry]:
-    """Return the residuals of a step that begins in a state (12,)."""
+    """Return the residuals of a step that begins in a state (12,); the last one ends as its target does."""
     trajectory = step.trajectory
     nodes = trajectory.states[:, 1:].reshape(-1, 12).T
     mechanics = mechanics_at(walker, step.spring, nodes[:6], nodes[6:])
@@ -91,6 +92,7 @@ def _step_entries(
         *collocation_entries(walker, trajectory, mechanics),
         *jump_entries(walker, step, before),
         CertificateEntry("landing", abs(landing), "m", _TOLERANCE),
+        *([] if is_last else landing_speed_entries(walker, mechanics)),
         *contact_entries(walker, step.step_length, mechanics, forces),
         *bound_entries(walker, step.step_length, trajectory),
         CertificateEntry("torque_limit", torque, "N m", _TORQUE_TOLERANCE * walker.weight),
