@@ -8,6 +8,7 @@ from walk_optimizer.mechanics import Mechanics, foot_arm, horizontal_and_vertica
 from walk_optimizer.model.kinematics import RELABELLED
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.transcription.phases import INSTANT_POINTS
 
 FloatArray = NDArray[np.float64]
 
@@ -143,6 +144,19 @@ def landing_speed_entries(walker: WalkerParameters, mechanics: Mechanics) -> lis
     return [CertificateEntry("landing_speed", shortfall, "m/s", _KINEMATIC_TOLERANCE)]
 
 
+def stance_load_entries(walker: WalkerParameters, normal: FloatArray) -> list[CertificateEntry]:
+    """Return by how much no foot carries the least load; nothing where none is asked for.
+
+    Args:
+        walker: The walker.
+        normal: Normal forces on both feet in [N], (2, N).
+    """
+    if not walker.stance_load:
+        return []
+    shortfall = _excess(walker.stance_load * walker.weight - normal.max(axis=0))
+    return [CertificateEntry("stance_load", shortfall, "N", RELATIVE_TOLERANCE * walker.weight)]
+
+
 def certify(
     walker: WalkerParameters, request: GaitRequest, spring: KneeSpring, trajectory: Trajectory
 ) -> Certificate:
@@ -176,6 +190,8 @@ def certify(
         CertificateEntry("speed", _excess(shortfall), "m/s", _KINEMATIC_TOLERANCE),
         *tread_entries(walker, request, step_length),
         *landing_speed_entries(walker, mechanics),
+        # The first points hold the impact.
+        *stance_load_entries(walker, trajectory.reaction[[2, 5], INSTANT_POINTS:]),
         *_contact_entries(walker, mechanics, trajectory, request.step_length),
         *_bound_entries(walker, trajectory),
         *spring_entries(walker, request.spring_mode, spring),

@@ -7,6 +7,7 @@ from walk_optimizer.certificate import (
     RELATIVE_TOLERANCE,
     landing_speed_entries,
     spring_entries,
+    stance_load_entries,
     tread_entries,
 )
 from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
@@ -54,6 +55,7 @@ def certify_refined(walker: WalkerParameters, request: GaitRequest, gait: Refine
         CertificateEntry("landing", _landing_error(walker, request, gait), "m", _TOLERANCE),
         *tread_entries(walker, request, gait.step_length),
         *landing_speed_entries(walker, mechanics),
+        *stance_load_entries(walker, along_and_normal(walker, forces)[1::2]),
         *contact_entries(walker, request.step_length, mechanics, forces),
         *bound_entries(walker, request.step_length, trajectory),
         *spring_entries(walker, request.spring_mode, gait.spring),

@@ -115,6 +115,7 @@ def test_limits_of_the_walker_that_the_gait_is_held_against(solved):
         ({"stiffness_limit": solved.spring.stiffness - 1}, {"stiffness_limits"}),
         ({"friction_coefficient": 0.01}, {"friction_cone"}),
         ({"landing_speed": 2.0}, {"landing_speed"}),
+        ({"stance_load": 0.99}, {"stance_load"}),
     ):
         assert failures(solved, walker=replace(solved.walker, **limits)) == expected
 

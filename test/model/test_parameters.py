@@ -9,6 +9,7 @@ from walk_optimizer.errors import ConfigurationError, InvalidRequestError
 from walk_optimizer.model.parameters import (
     DYNAMIC_PARAMETERS,
     GROUND_PARAMETERS,
+    MARGINS,
     SpringMode,
     WalkerParameters,
 )
@@ -16,7 +17,7 @@ from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.model.terrain import Terrain
 
 FIELDS = [field.name for field in fields(WalkerParameters) if field.name != "terrain"]
-ABOVE_ZERO = [name for name in FIELDS if name != "landing_speed"]
+ABOVE_ZERO = [name for name in FIELDS if name not in MARGINS]
 
 
 @pytest.mark.parametrize("name", ABOVE_ZERO)
@@ -27,11 +28,18 @@ def test_impossible_numbers_are_refused_by_name(name, value):
     assert f"{name} is {value}, allowed are finite numbers above 0" in str(refusal.value)
 
 
+@pytest.mark.parametrize("name", MARGINS)
 @pytest.mark.parametrize("value", [-0.1, math.nan, math.inf])
-def test_a_landing_speed_is_0_or_above(value):
-    with pytest.raises(ConfigurationError, match=r"landing_speed is .+ 0 and finite numbers above"):
-        WalkerParameters(landing_speed=value)
-    assert WalkerParameters(landing_speed=0).landing_speed == 0
+def test_a_margin_is_0_or_above(name, value):
+    with pytest.raises(ConfigurationError) as refusal:
+        WalkerParameters(**{name: value})
+    assert f"{name} is {value}, allowed are 0 and finite numbers above" in str(refusal.value)
+    assert getattr(WalkerParameters(**{name: 0}), name) == 0
+
+
+def test_a_foot_can_not_always_carry_more_than_the_weight():
+    with pytest.raises(ConfigurationError, match=r"stance_load is 1\.0, allowed is 0 to below 1"):
+        WalkerParameters(stance_load=1.0)
 
 
 @pytest.mark.parametrize("name", FIELDS)
@@ -60,9 +68,9 @@ def test_every_parameter_changes_the_fingerprint(name):
     assert replace(walker, **{name: changed}).fingerprint() != walker.fingerprint()
 
 
-def test_gaits_keep_the_names_that_they_had_before_walkers_had_a_terrain_and_a_landing_speed():
+def test_gaits_keep_the_names_that_they_had_before_walkers_had_terrain_and_margins():
     assert WalkerParameters().fingerprint() == "e3fd61db33fc207d"
-    assert WalkerParameters(landing_speed=-0.0).fingerprint() == WalkerParameters().fingerprint()
+    assert WalkerParameters(landing_speed=-0.0, stance_load=0).fingerprint() == "e3fd61db33fc207d"
 
 
 def test_the_walker_of_the_report():

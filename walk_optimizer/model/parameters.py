@@ -59,7 +59,8 @@ DYNAMIC_PARAMETERS = (
 )
 # What contact depends on besides: the terrain, and the length of its treads, which is that of the step.
 GROUND_PARAMETERS = ("slope", "step_up", "tread")
-_MAY_BE_ZERO = ("landing_speed",)
+# Margins that a gait keeps where they are above 0.
+MARGINS = ("landing_speed", "stance_load")
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,7 @@ class WalkerParameters:
         stiffness_limit: Largest knee stiffness K in [N m/rad].
         landing_speed: Least speed towards the ground in [m/s] of the foot that lands as a step ends; 0 sets
             no bound. The last step to a stand, which sets its foot down softly, is not bound by it.
+        stance_load: Least load on a foot that stands alone, as a part of the weight [-]; 0 sets no bound.
         terrain: The ground that it walks on.
     """
 
@@ -91,18 +93,24 @@ class WalkerParameters:
     hip_angle_limit: float = math.pi / 2
     stiffness_limit: float = 2000.0
     landing_speed: float = 0.0
+    stance_load: float = 0.0
     terrain: Terrain = field(default_factory=Terrain)
 
     def __post_init__(self) -> None:
         """Refuse values that no walker can have."""
         for entry in fields(self):
             if entry.name != "terrain":
-                value = _finite(entry.name, getattr(self, entry.name), zero=entry.name in _MAY_BE_ZERO)
+                value = _finite(entry.name, getattr(self, entry.name), zero=entry.name in MARGINS)
                 object.__setattr__(self, entry.name, value)
         if abs(self.terrain.step_up) >= self.leg_length:
             raise ConfigurationError(
                 f"terrain step_up is {self.terrain.step_up} m, allowed is less than the leg's "
                 f"{self.leg_length} m, up or down"
+            )
+        if self.stance_load >= 1:
+            raise ConfigurationError(
+                f"walker parameter stance_load is {self.stance_load}, allowed is 0 to below 1: "
+                "on average the feet carry the weight"
             )
         if self.hip_angle_limit > math.pi:
             raise ConfigurationError(
@@ -176,8 +184,9 @@ class WalkerParameters:
         entries = asdict(self)
         if self.terrain.is_flat:
             del entries["terrain"]
-        if not self.landing_speed:
-            del entries["landing_speed"]
+        for name in MARGINS:
+            if not entries[name]:
+                del entries[name]
         text = json.dumps(entries, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 

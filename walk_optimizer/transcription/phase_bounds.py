@@ -137,8 +137,16 @@ def _contact_bounds(modes: Modes) -> RowBounds:
     return low, high
 
 
-def force_bounds(modes: Sequence[FootMode]) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of forces or impulses, (4,) each: none on a free foot, no pulling."""
-    loaded = np.repeat([mode is not FootMode.FREE for mode in modes], 2)
-    high = np.where(loaded, np.inf, 0.0)
-    return np.where([True, False, True, False], -high, 0.0), high
+def force_bounds(modes: Sequence[FootMode], least: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of forces or impulses, (4,) each: none on a free foot, no pulling.
+
+    Args:
+        modes: What each foot does.
+        least: Least vertical force in [N] on a foot that stands alone.
+    """
+    stands = np.array([mode is not FootMode.FREE for mode in modes])
+    high = np.where(np.repeat(stands, 2), np.inf, 0.0)
+    low = np.where([True, False, True, False], -high, 0.0)
+    if stands.sum() == 1:
+        low[1::2][stands] = least
+    return low, high

@@ -13,6 +13,7 @@ from walk_optimizer.transcription import layout
 from walk_optimizer.transcription.boundary import periodic_bounds, periodic_ends
 from walk_optimizer.transcription.chain import assemble
 from walk_optimizer.transcription.euler_stage import euler_kind
+from walk_optimizer.transcription.phases import INSTANT_POINTS
 from walk_optimizer.transcription.program import Nlp, Problem
 from walk_optimizer.transcription.scaling import point_units, spring_units
 from walk_optimizer.transcription.stage import Stage
@@ -66,6 +67,8 @@ def _variable_bounds(request: GaitRequest, walker: WalkerParameters) -> tuple[Fl
         bounds[layout.STATE] = of_state[:, None]
     lower[layout.REACTION] = 0.0
     lower[layout.SLIP] = 0.0
+    # Who stands alone is not known here: foot 1 stands all through the step, but for its first impact.
+    lower[layout.REACTION.start + _NORMAL, INSTANT_POINTS:] = walker.stance_load * walker.weight
     return lower, upper
 
 

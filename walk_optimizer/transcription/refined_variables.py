@@ -70,7 +70,8 @@ class RefinedVariables:
         count, phases = self.mesh.intervals, len(self.mesh.phases)
         states = state_bounds(self.walker)
         modes = [self.mesh.phases[k].modes for k in self.mesh.phase_of_interval]
-        forces = np.array([force_bounds(one) for one in modes]).transpose(1, 0, 2)
+        least = _least_vertical_force(self.walker)
+        forces = np.array([force_bounds(one, least) for one in modes]).transpose(1, 0, 2)
         impulses = np.array([force_bounds(phase.impact) for phase in self.mesh.phases]).transpose(1, 0, 2)
         lower, upper = (
             self.pack(
@@ -145,3 +146,14 @@ class RefinedVariables:
             impulses=impulses,
             spring=KneeSpring(float(stiffness), float(equilibrium)),
         )
+
+
+def _least_vertical_force(walker: WalkerParameters) -> float:
+    """Return a vertical force in [N] within the friction cone that loads a foot as it has to be.
+
+    On a slope a, n = f_y cos a - f_x sin a is the normal force and t, |t| <= mu n, the tangential one: then
+    f_y = n cos a + t sin a <= n (cos a + mu |sin a|).
+    """
+    slope = walker.terrain.slope
+    widest = np.cos(slope) + walker.friction_coefficient * abs(np.sin(slope))
+    return float(walker.stance_load * walker.weight * widest)

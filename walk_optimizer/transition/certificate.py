@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.certificate import landing_speed_entries
+from walk_optimizer.certificate import landing_speed_entries, stance_load_entries
 from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
-from walk_optimizer.mechanics import mechanics_at
+from walk_optimizer.mechanics import along_and_normal, mechanics_at
 from walk_optimizer.model.kinematics import HIP_X, HIP_Y
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.refined_certificate import (
@@ -93,6 +93,7 @@ def _step_entries(
         *jump_entries(walker, step, before),
         CertificateEntry("landing", abs(landing), "m", _TOLERANCE),
         *([] if is_last else landing_speed_entries(walker, mechanics)),
+        *stance_load_entries(walker, along_and_normal(walker, forces)[1::2]),
         *contact_entries(walker, step.step_length, mechanics, forces),
         *bound_entries(walker, step.step_length, trajectory),
         CertificateEntry("torque_limit", torque, "N m", _TORQUE_TOLERANCE * walker.weight),
