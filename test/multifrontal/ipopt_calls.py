@@ -64,8 +64,9 @@ def _array(values, kind):
 class Factorization:
     """One pattern, factored for as many matrices as one likes."""
 
-    def __init__(self, library, matrix, threshold=1e-8):
+    def __init__(self, library, matrix, threshold=1e-8, threads=1):
         self._calls, self._control = ctypes.CDLL(str(library)), _Control()
+        self._threads = threads
         self._calls.ma97_default_control_d(ctypes.byref(self._control))
         self._control.u = threshold
         lower = sp.csc_matrix(sp.tril(matrix))
@@ -90,6 +91,7 @@ class Factorization:
         values, info = np.ascontiguousarray(sp.csc_matrix(sp.tril(matrix)).data, dtype=float), _Info()
         assert values.size == self._index.size
         analysis, factors, control = self._state()
+        self._calls.use_threads(self._threads)
         self._calls.ma97_factor_d(
             4, *self._pattern(), _array(values, ctypes.c_double), analysis, factors, control,
             ctypes.byref(info), None,

@@ -214,3 +214,23 @@ def test_patterns_that_are_used_in_turn_are_told_apart():
         right = np.ones(matrix.shape[0])
         check(matrix, right, factorization.solve(right))
         factorization.close()
+
+
+@pytest.mark.parametrize("stages", [1, 2, 60])
+def test_two_threads_find_the_very_same_factors(stages):
+    generator = np.random.default_rng(11)
+    matrix = chain(stages, generator)
+    scales = 10.0 ** generator.uniform(-4, 4, (2, matrix.shape[0]))
+    # Each begins with what is learnt from those before it.
+    matrices = [matrix, *(rescaled(matrix, one) for one in scales), matrix]
+    right = generator.standard_normal(matrix.shape[0])
+    found = []
+    for threads in (1, 2):
+        factorization = Factorization(LIBRARY, matrix, threads=threads)
+        verdicts = [factorization.factor(one) for one in matrices]
+        found.append((verdicts, factorization.solve(right)))
+        factorization.close()
+    (verdicts, solution), (same_verdicts, same_solution) = found
+    assert verdicts == same_verdicts
+    np.testing.assert_array_equal(solution, same_solution)
+    check(matrix, right, solution)

@@ -10,9 +10,10 @@ import pytest
 from solve.small_programs import START, rosenbrock
 
 from walk_optimizer.solve import session as session_module
+from walk_optimizer.solve import sharing
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
-from walk_optimizer.solve.sharing import Shares
+from walk_optimizer.solve.sharing import Shares, free_processors
 from walk_optimizer.solve.status import Status
 
 
@@ -42,6 +43,14 @@ def test_every_piece_is_done_once_by_as_many_processes_as_asked(processes):
     assert len(set(results.values())) == processes
     assert os.getpid() in results.values()
     assert running_children() == []
+
+
+def test_processes_that_share_work_leave_each_other_their_processors(monkeypatch):
+    monkeypatch.setattr(sharing, "processor_count", lambda: 3)
+    assert free_processors() == 3
+    assert set(Shares(lambda _: free_processors(), 8).done(2, never, int).values()) == {2}
+    assert set(Shares(lambda _: free_processors(), 8).done(5, never, int).values()) == {1}
+    assert free_processors() == 3
 
 
 def test_no_more_processes_than_pieces_and_none_for_nothing():

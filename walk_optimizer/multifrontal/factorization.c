@@ -5,11 +5,12 @@
  *
  * A front is a small dense matrix: its candidates for pivots, then its border. Candidates that fail the
  * threshold test are delayed to the parent. What is left of a front, its contribution, waits on a stack
- * for its parent. */
+ * for its parent. Two threads do the two parts of the branches, then one of them the trunk. */
 #include "factorization.h"
 
 #include <float.h>
 #include <math.h>
+#include <pthread.h>
 #include <string.h>
 
 #include "dense_front.h"
@@ -33,139 +34,206 @@ static void equilibrate(const Analysis *analysis, const double *values, Factors 
         if (largest[i] > 0.0) scale[i] /= sqrt(largest[i]);
 }
 
-/* List the unknowns of front f: its pivots, those delayed by its children, its border.
- * Returns the number of candidates, -1 when memory runs out. */
-static int list_unknowns(const AssemblyTree *tree, int f, Factors *factors) {
-    Integers *indices = &factors->indices;
+/* The elimination of one part. */
+typedef struct {
+    const Analysis *analysis;
+    const double *values;
+    double threshold, smallest;
+    Factors *factors;
+    int part;
+    Workspace *own; /* of the part */
+    Inertia inertia;
+    int fine; /* false when memory ran out */
+} Task;
+
+/* What the part of a front has written. */
+static const Workspace *written(const Task *task, int f) {
+    return &task->factors->parts[task->analysis->part_of[f]];
+}
+
+/* Append those unknowns to a list whose home is front f, or those that have another; return the end. */
+static int *append(int *to, const int *unknowns, int count, const int *home, int f, int at_home) {
+    for (int k = 0; k < count; k++)
+        if ((home[unknowns[k]] <= f) == at_home) *to++ = unknowns[k];
+    return to;
+}
+
+/* List the unknowns of front f: candidates for pivots, which are its own and those delayed by its children,
+ * then its border. Those that an ancestor eliminated the last time are not tried: they come after the others.
+ * Returns the number of candidates that are, -1 when memory runs out. */
+static int list_unknowns(Task *task, int f) {
+    const Analysis *analysis = task->analysis;
+    const AssemblyTree *tree = analysis->tree;
+    Factors *factors = task->factors;
+    Integers *indices = &task->own->indices;
     Front *front = &factors->fronts[f];
     int own = tree->pivot_begin[f + 1] - tree->pivot_begin[f];
     int border = tree->border_begin[f + 1] - tree->border_begin[f];
-    size_t delayed = 0;
-    for (size_t w = factors->waiting.used; w > 0; w--) {
-        int child = factors->waiting.data[w - 1];
-        if (tree->parent[child] != f) break;
-        delayed += factors->fronts[child].delayed;
-    }
-    if (!reserve_integers(indices, own + delayed + border)) return -1;
+    front->delayed = own;
+    for (int child = analysis->first_child[f]; child >= 0; child = analysis->sibling[child])
+        front->delayed += factors->fronts[child].delayed;
+    front->size = front->delayed + border;
+    if (!reserve_integers(indices, front->size)) return -1;
     front->unknowns = indices->used;
-    int *list = indices->data + indices->used, size = own;
-    memcpy(list, factors->pivots + tree->pivot_begin[f], own * sizeof(int));
-    for (size_t w = factors->waiting.used; size < own + (int)delayed; w--) {
-        const Front *from = &factors->fronts[factors->waiting.data[w - 1]];
-        memcpy(list + size, indices->data + from->unknowns + from->eliminated, from->delayed * sizeof(int));
-        size += from->delayed;
-    }
-    int candidates = size;
-    memcpy(list + size, tree->border + tree->border_begin[f], border * sizeof(int));
-    front->size = size + border;
     indices->used += front->size;
-    for (int i = 0; i < front->size; i++) factors->place[list[i]] = i;
-    return candidates;
+    int *list = indices->data + front->unknowns, *to = list, tried = 0;
+    for (int at_home = 1; at_home >= 0; at_home--) {
+        to = append(to, factors->pivots + tree->pivot_begin[f], own, factors->home, f, at_home);
+        for (int child = analysis->first_child[f]; child >= 0; child = analysis->sibling[child]) {
+            const Front *from = &factors->fronts[child];
+            const int *unknowns = written(task, child)->indices.data + from->unknowns + from->eliminated;
+            to = append(to, unknowns, from->delayed, factors->home, f, at_home);
+        }
+        if (at_home) tried = to - list;
+    }
+    memcpy(to, tree->border + tree->border_begin[f], border * sizeof(int));
+    for (int i = 0; i < front->size; i++) task->own->place[list[i]] = i;
+    return tried;
 }
 
-/* Sum up the front: its entries of the matrix and the contributions of its children, which it takes off
- * the stack; false when memory runs out. */
-static int assemble(const Analysis *analysis, const double *values, int f, Factors *factors) {
-    const Front *front = &factors->fronts[f];
-    size_t size = front->size;
-    if (!reserve_doubles(&factors->values, size * (size + 2))) return 0;
-    double *restrict a = factors->values.data + factors->values.used;
-    const int *place = factors->place;
-    const double *scale = factors->scale;
+/* Add the contribution of a child to a front. */
+static void add_contribution(const Task *task, int child, double *restrict a, size_t size) {
+    const Front *of = &task->factors->fronts[child];
+    const Workspace *from = written(task, child);
+    int rest = of->size - of->eliminated;
+    const int *unknowns = from->indices.data + of->unknowns + of->eliminated;
+    const double *restrict entries = from->stack.data + of->contribution;
+    int *restrict to = task->own->places;
+    for (int r = 0; r < rest; r++) to[r] = task->own->place[unknowns[r]];
+    for (int c = 0; c < rest; c++, entries += rest) {
+        size_t j = to[c];
+        for (int r = c; r < rest; r++) {
+            size_t i = to[r], low = i < j ? i : j, high = i < j ? j : i;
+            a[high + low * size] += entries[r];
+        }
+    }
+}
+
+/* Sum up the front: its entries of the matrix and the contributions of its children, of which those of this
+ * part are taken off the stack; false when memory runs out. */
+static int assemble(Task *task, int f) {
+    const Analysis *analysis = task->analysis;
+    Workspace *own = task->own;
+    size_t size = task->factors->fronts[f].size;
+    if (!reserve_doubles(&own->values, size * (size + 2))) return 0;
+    double *restrict a = own->values.data + own->values.used;
+    const double *scale = task->factors->scale;
     memset(a, 0, size * size * sizeof(double));
     for (int e = analysis->entry_begin[f]; e < analysis->entry_begin[f + 1]; e++) {
         int row = analysis->row[e], column = analysis->column[e];
-        size_t i = place[row], j = place[column];
-        a[i > j ? i + j * size : j + i * size] += values[analysis->entry[e]] * scale[row] * scale[column];
+        size_t i = own->place[row], j = own->place[column];
+        a[i > j ? i + j * size : j + i * size] += task->values[analysis->entry[e]] * scale[row] * scale[column];
     }
-    Integers *waiting = &factors->waiting;
-    while (waiting->used > 0 && analysis->tree->parent[waiting->data[waiting->used - 1]] == f) {
-        const Front *child = &factors->fronts[waiting->data[--waiting->used]];
-        int rest = child->size - child->eliminated;
-        const int *unknowns = factors->indices.data + child->unknowns + child->eliminated;
-        const double *from = factors->stack.data + child->contribution;
-        int *restrict to = factors->places;
-        for (int r = 0; r < rest; r++) to[r] = place[unknowns[r]];
-        for (int c = 0; c < rest; c++, from += rest) {
-            size_t j = to[c];
-            for (int r = c; r < rest; r++) {
-                size_t i = to[r], low = i < j ? i : j, high = i < j ? j : i;
-                a[high + low * size] += from[r];
-            }
-        }
-        factors->stack.used = child->contribution;
+    for (int child = analysis->first_child[f]; child >= 0; child = analysis->sibling[child]) {
+        add_contribution(task, child, a, size);
+        if (analysis->part_of[child] == task->part)
+            own->stack.used = task->factors->fronts[child].contribution;
     }
     return 1;
 }
 
-/* Eliminate what can be of a front; its columns of L stay where it was assembled, followed by D. */
-static void eliminate_front(Factors *factors, Front *front, int candidates, double threshold,
-                            double smallest, Inertia *inertia) {
+/* Eliminate what can be of front f; its columns of L stay where it was assembled, followed by D. */
+static void eliminate_front(Task *task, int f, int candidates) {
+    Front *front = &task->factors->fronts[f];
+    Inertia *inertia = &task->inertia;
     size_t size = front->size;
-    double *a = factors->values.data + factors->values.used, *diagonal = a + size * size;
-    int *unknowns = factors->indices.data + front->unknowns;
+    double *a = task->own->values.data + task->own->values.used, *diagonal = a + size * size;
+    int *unknowns = task->own->indices.data + front->unknowns;
     DenseFront dense = {a, size, candidates, unknowns, diagonal, diagonal + size};
-    Elimination done = eliminate_candidates(&dense, threshold, smallest);
+    Elimination done = eliminate_candidates(&dense, task->threshold, task->smallest);
     front->eliminated = done.eliminated;
-    front->delayed = candidates - done.eliminated;
+    front->delayed -= done.eliminated;
+    for (int p = 0; p < done.eliminated; p++) task->factors->home[unknowns[p]] = f;
     inertia->rank += done.eliminated;
     inertia->negative += done.negative;
     inertia->two_by_two += done.two_by_two;
+    inertia->delayed += front->delayed;
+    if (front->size > inertia->largest_front) inertia->largest_front = front->size;
+    inertia->entries += (long)done.eliminated * (2 * front->size - done.eliminated + 1) / 2;
+    for (long p = size; p > (long)size - done.eliminated; p--) inertia->operations += p * (p + 1) / 2;
 }
 
 /* Put the front's contribution on the stack, and close up its columns of L and D; false when memory runs
  * out. */
-static int store(Factors *factors, int f) {
-    Front *front = &factors->fronts[f];
+static int store(Task *task, int f) {
+    Front *front = &task->factors->fronts[f];
+    Doubles *values = &task->own->values, *stack = &task->own->stack;
     size_t size = front->size, eliminated = front->eliminated, rest = size - eliminated;
-    if (!reserve_doubles(&factors->stack, rest * rest) || !reserve_integers(&factors->waiting, 1)) return 0;
-    double *a = factors->values.data + factors->values.used, *to = factors->stack.data + factors->stack.used;
+    if (!reserve_doubles(stack, rest * rest)) return 0;
+    double *a = values->data + values->used, *to = stack->data + stack->used;
     for (size_t c = 0; c < rest; c++)
         memcpy(to + c + c * rest, a + eliminated + c + (eliminated + c) * size, (rest - c) * sizeof(double));
-    front->contribution = factors->stack.used;
-    factors->stack.used += rest * rest;
-    factors->waiting.data[factors->waiting.used++] = f;
-    front->columns = factors->values.used;
+    front->contribution = stack->used;
+    stack->used += rest * rest;
+    front->columns = values->used;
     front->diagonal = front->columns + size * eliminated;
     front->below = front->diagonal + eliminated;
     memmove(a + size * eliminated, a + size * size, eliminated * sizeof(double));
     memmove(a + (size + 1) * eliminated, a + size * (size + 1), eliminated * sizeof(double));
-    factors->values.used += (size + 2) * eliminated;
+    values->used += (size + 2) * eliminated;
     return 1;
 }
 
 /* Keep the order of the front's own pivots for the next matrix, whose good pivots will be much the same. */
-static void remember_order(const Analysis *analysis, Factors *factors, int f, int candidates) {
-    const int *unknowns = factors->indices.data + factors->fronts[f].unknowns;
-    const AssemblyTree *tree = analysis->tree;
-    int *own = factors->pivots + tree->pivot_begin[f], count = tree->pivot_begin[f + 1] - tree->pivot_begin[f];
-    int kept = 0;
-    for (int i = 0; i < candidates && kept < count; i++)
-        if (analysis->front_of[unknowns[i]] == f) own[kept++] = unknowns[i];
+static void remember_order(Task *task, int f) {
+    const int *unknowns = task->own->indices.data + task->factors->fronts[f].unknowns;
+    const AssemblyTree *tree = task->analysis->tree;
+    int *own = task->factors->pivots + tree->pivot_begin[f];
+    int count = tree->pivot_begin[f + 1] - tree->pivot_begin[f], kept = 0;
+    for (int i = 0; kept < count; i++)
+        if (task->analysis->front_of[unknowns[i]] == f) own[kept++] = unknowns[i];
 }
 
-int factor(const Analysis *analysis, const double *values, double threshold, double smallest,
+/* Eliminate the fronts of a part, children first. */
+static void *eliminate_part(void *argument) {
+    Task *task = argument;
+    Workspace *own = task->own;
+    own->values.used = own->stack.used = own->indices.used = 0;
+    for (int f = 0; task->fine && f < task->analysis->tree->front_count; f++) {
+        if (task->analysis->part_of[f] != task->part) continue;
+        int candidates = list_unknowns(task, f);
+        task->fine = candidates >= 0 && assemble(task, f);
+        if (!task->fine) break;
+        eliminate_front(task, f, candidates);
+        remember_order(task, f);
+        task->fine = store(task, f);
+    }
+    return NULL;
+}
+
+static void add_inertia(Inertia *sum, const Inertia *part) {
+    sum->negative += part->negative;
+    sum->rank += part->rank;
+    sum->delayed += part->delayed;
+    sum->two_by_two += part->two_by_two;
+    sum->entries += part->entries;
+    sum->operations += part->operations;
+    if (part->largest_front > sum->largest_front) sum->largest_front = part->largest_front;
+}
+
+int factor(const Analysis *analysis, const double *values, double threshold, double smallest, int threads,
            Factors **made, Inertia *inertia) {
-    const AssemblyTree *tree = analysis->tree;
     Factors *factors = *made != NULL ? *made : (*made = new_factors(analysis));
     if (factors == NULL) return 0;
-    factors->values.used = factors->stack.used = factors->indices.used = factors->waiting.used = 0;
     *inertia = (Inertia){0};
-    /* Of scaled entries, which are at most about 1, what is smaller than this is rounding. */
-    smallest = fmax(smallest, DBL_EPSILON);
     equilibrate(analysis, values, factors);
-    for (int f = 0; f < tree->front_count; f++) {
-        int candidates = list_unknowns(tree, f, factors);
-        if (candidates < 0 || !assemble(analysis, values, f, factors)) return 0;
-        Front *front = &factors->fronts[f];
-        eliminate_front(factors, front, candidates, threshold, smallest, inertia);
-        remember_order(analysis, factors, f, candidates);
-        if (!store(factors, f)) return 0;
-        int eliminated = front->eliminated, size = front->size;
-        inertia->delayed += front->delayed;
-        inertia->largest_front = size > inertia->largest_front ? size : inertia->largest_front;
-        inertia->entries += (long)eliminated * (2 * size - eliminated + 1) / 2;
-        for (int p = 0; p < eliminated; p++) inertia->operations += (long)(size - p) * (size - p + 1) / 2;
+    Task tasks[PARTS];
+    for (int k = 0; k < PARTS; k++)
+        /* Of scaled entries, which are at most about 1, what is smaller than epsilon is rounding. */
+        tasks[k] = (Task){analysis, values, threshold, fmax(smallest, DBL_EPSILON), factors, k,
+                          &factors->parts[k], {0}, 1};
+    pthread_t other;
+    int apart = threads > 1 && pthread_create(&other, NULL, eliminate_part, &tasks[OTHER_BRANCHES]) == 0;
+    eliminate_part(&tasks[FIRST_BRANCHES]);
+    if (apart)
+        pthread_join(other, NULL);
+    else
+        eliminate_part(&tasks[OTHER_BRANCHES]);
+    if (tasks[FIRST_BRANCHES].fine && tasks[OTHER_BRANCHES].fine) eliminate_part(&tasks[TRUNK]);
+    int fine = 1;
+    for (int k = 0; k < PARTS; k++) {
+        add_inertia(inertia, &tasks[k].inertia);
+        fine = fine && tasks[k].fine;
     }
-    return 1;
+    return fine;
 }

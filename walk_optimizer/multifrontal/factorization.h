@@ -27,13 +27,13 @@ void free_analysis(Analysis *analysis);
 /* Factor a matrix with this pattern into the memory of *factors, which is made where it is NULL.
  *
  * values: as index was. threshold: a pivot is at least this part of the largest entry of its column.
- * smallest: entries up to this count as zero.
+ * smallest: entries up to this count as zero. threads: two make use of two processors; the result is the same.
  * Returns false when memory runs out. */
-int factor(const Analysis *analysis, const double *values, double threshold, double smallest,
+int factor(const Analysis *analysis, const double *values, double threshold, double smallest, int threads,
            Factors **factors, Inertia *inertia);
 void free_factors(Factors *factors);
 
-/* Forget the scales and the order of pivots that earlier matrices have left behind. */
+/* Forget the scales, the order of pivots and the delays that earlier matrices have left behind. */
 void forget(const Analysis *analysis, Factors *factors);
 
 /* Solve in place for one right-hand side x[n]. */

@@ -24,6 +24,16 @@ int reserve_integers(Integers *array, size_t count) {
     return array->used + count <= array->room;
 }
 
+static void link_children(const AssemblyTree *tree, int *first_child, int *sibling) {
+    for (int f = 0; f < tree->front_count; f++) first_child[f] = -1;
+    for (int f = 0; f < tree->front_count; f++) {
+        int parent = tree->parent[f];
+        if (parent < 0) continue;
+        sibling[f] = first_child[parent];
+        first_child[parent] = f;
+    }
+}
+
 /* Give every entry of the matrix to the front that eliminates the first of its two unknowns. */
 static void assign_entries(Analysis *analysis, int n, const int *begin, const int *index) {
     const AssemblyTree *tree = analysis->tree;
@@ -55,7 +65,7 @@ void free_analysis(Analysis *analysis) {
     if (analysis == NULL) return;
     free_assembly_tree(analysis->tree);
     free(analysis->entry_begin), free(analysis->entry), free(analysis->row), free(analysis->column);
-    free(analysis->front_of);
+    free(analysis->front_of), free(analysis->part_of), free(analysis->first_child), free(analysis->sibling);
     free(analysis);
 }
 
@@ -66,13 +76,20 @@ Analysis *analyse(int n, const int *begin, const int *index) {
     analysis->entry_count = begin[n];
     analysis->tree = order_by_minimum_degree(n, begin, index);
     if (analysis->tree != NULL) {
-        analysis->entry_begin = malloc(((size_t)analysis->tree->front_count + 1) * sizeof(int));
+        size_t fronts = (size_t)analysis->tree->front_count + 1;
+        analysis->part_of = malloc(fronts * sizeof(int));
+        analysis->first_child = malloc(fronts * sizeof(int));
+        analysis->sibling = malloc(fronts * sizeof(int));
+        analysis->entry_begin = malloc(fronts * sizeof(int));
         analysis->entry = malloc(entries * sizeof(int));
         analysis->row = malloc(entries * sizeof(int));
         analysis->column = malloc(entries * sizeof(int));
         analysis->front_of = malloc(((size_t)n + 1) * sizeof(int));
-        if (analysis->entry_begin != NULL && analysis->entry != NULL && analysis->row != NULL &&
-            analysis->column != NULL && analysis->front_of != NULL) {
+        if (analysis->part_of != NULL && analysis->first_child != NULL && analysis->sibling != NULL &&
+            analysis->entry_begin != NULL && analysis->entry != NULL && analysis->row != NULL &&
+            analysis->column != NULL && analysis->front_of != NULL &&
+            divide_fronts(analysis->tree, analysis->part_of)) {
+            link_children(analysis->tree, analysis->first_child, analysis->sibling);
             assign_entries(analysis, n, begin, index);
             return analysis;
         }
@@ -83,31 +100,40 @@ Analysis *analyse(int n, const int *begin, const int *index) {
 
 void free_factors(Factors *factors) {
     if (factors == NULL) return;
-    free(factors->fronts), free(factors->values.data), free(factors->stack.data);
-    free(factors->indices.data), free(factors->waiting.data), free(factors->place);
-    free(factors->pivots), free(factors->places), free(factors->part), free(factors->scale), free(factors->largest);
+    for (int k = 0; k < PARTS; k++) {
+        Workspace *part = &factors->parts[k];
+        free(part->values.data), free(part->stack.data), free(part->indices.data);
+        free(part->place), free(part->places);
+    }
+    free(factors->fronts), free(factors->pivots), free(factors->home);
+    free(factors->piece), free(factors->scale), free(factors->largest);
     free(factors);
 }
 
 void forget(const Analysis *analysis, Factors *factors) {
     memcpy(factors->pivots, analysis->tree->pivots, (size_t)analysis->tree->n * sizeof(int));
+    memcpy(factors->home, analysis->front_of, (size_t)analysis->tree->n * sizeof(int));
     for (int i = 0; i < analysis->tree->n; i++) factors->scale[i] = 1.0;
 }
 
 Factors *new_factors(const Analysis *analysis) {
-    const AssemblyTree *tree = analysis->tree;
+    size_t n = (size_t)analysis->tree->n + 1;
     Factors *factors = calloc(1, sizeof *factors);
     if (factors == NULL) return NULL;
-    factors->fronts = malloc(((size_t)tree->front_count + 1) * sizeof(Front));
-    factors->place = malloc(((size_t)tree->n + 1) * sizeof(int));
-    factors->pivots = malloc(((size_t)tree->n + 1) * sizeof(int));
-    factors->places = malloc(((size_t)tree->n + 1) * sizeof(int));
-    factors->part = malloc(((size_t)tree->n + 1) * sizeof(double));
-    factors->scale = malloc(((size_t)tree->n + 1) * sizeof(double));
-    factors->largest = malloc(((size_t)tree->n + 1) * sizeof(double));
-    if (factors->fronts != NULL && factors->pivots != NULL && factors->place != NULL &&
-        factors->places != NULL && factors->part != NULL && factors->scale != NULL &&
-        factors->largest != NULL) {
+    factors->fronts = malloc(((size_t)analysis->tree->front_count + 1) * sizeof(Front));
+    factors->pivots = malloc(n * sizeof(int));
+    factors->home = malloc(n * sizeof(int));
+    factors->piece = malloc(n * sizeof(double));
+    factors->scale = malloc(n * sizeof(double));
+    factors->largest = malloc(n * sizeof(double));
+    int fine = factors->fronts != NULL && factors->pivots != NULL && factors->home != NULL &&
+               factors->piece != NULL && factors->scale != NULL && factors->largest != NULL;
+    for (int k = 0; k < PARTS; k++) {
+        factors->parts[k].place = malloc(n * sizeof(int));
+        factors->parts[k].places = malloc(n * sizeof(int));
+        fine = fine && factors->parts[k].place != NULL && factors->parts[k].places != NULL;
+    }
+    if (fine) {
         forget(analysis, factors);
         return factors;
     }

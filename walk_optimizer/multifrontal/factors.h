@@ -5,21 +5,24 @@
 #include <stddef.h>
 
 #include "assembly_tree.h"
+#include "division.h"
 #include "factorization.h"
 
 struct Analysis {
     AssemblyTree *tree;
-    int *entry_begin; /* [front_count + 1] entries of the matrix that a front assembles */
-    int *entry;       /* [entries] their places among the values */
-    int *row, *column; /* [entries] their unknowns */
+    int *part_of;               /* [front_count] division of the work */
+    int *first_child, *sibling; /* [front_count] children of a front, the last one first; -1 for none */
+    int *entry_begin;           /* [front_count + 1] entries of the matrix that a front assembles */
+    int *entry;                 /* [entries] their places among the values */
+    int *row, *column;          /* [entries] their unknowns */
     int entry_count;
-    int *front_of;     /* [n] front that eliminates an unknown if nothing is delayed */
+    int *front_of; /* [n] front that eliminates an unknown if nothing is delayed */
 };
 
 /* One front after its elimination. L is unit lower triangular at its top. */
 typedef struct {
     int size, eliminated, delayed;
-    size_t unknowns;     /* [size] among the indices, pivots first */
+    size_t unknowns;     /* [size] among the indices of its part, pivots first */
     size_t columns;      /* [size x eliminated] of L among the values */
     size_t diagonal;     /* [eliminated] of D among the values */
     size_t below;        /* [eliminated] of D, below the diagonal: 0 but in a block of two */
@@ -36,16 +39,22 @@ typedef struct {
     size_t used, room;
 } Integers;
 
+/* What the elimination of a part writes. */
+typedef struct {
+    Doubles values, stack;
+    Integers indices;
+    int *place;  /* [n] of an unknown in the front being assembled */
+    int *places; /* [n] of the unknowns of a contribution in that front */
+} Workspace;
+
 struct Factors {
     Front *fronts;
-    Doubles values, stack;
-    double *scale;             /* [n] */
-    Integers indices, waiting; /* waiting: fronts whose contributions are on the stack */
-    int *pivots;               /* [n] those of the tree, within each front in the order of the last time */
-    int *place;                /* [n] of an unknown in the front being assembled */
-    int *places;               /* [n] of the unknowns of a contribution in that front */
-    double *part;              /* [n] of a right-hand side */
-    double *largest;           /* [n] scaled entry of a column */
+    Workspace parts[PARTS];
+    double *scale;   /* [n] */
+    int *pivots;     /* [n] those of the tree, within each front in the order of the last time */
+    int *home;       /* [n] front that eliminated an unknown the last time */
+    double *piece;   /* [n] of a right-hand side */
+    double *largest; /* [n] scaled entry of a column */
 };
 
 /* Reserve room at the end of an array that grows; false when memory runs out. */

@@ -108,6 +108,11 @@ static Handle *new_handle(int n, const int *ptr, const int *row) {
     return NULL;
 }
 
+/* Set by the program before a solve; IPOPT knows nothing of it. */
+static int threads = 1;
+
+EXPORTED void use_threads(int count) { threads = count; }
+
 EXPORTED void ma97_default_control_d(struct ma97_control *control) {
     memset(control, 0, sizeof *control);
     control->f_arrays = 1;
@@ -132,7 +137,7 @@ EXPORTED void ma97_factor_d(int matrix_type, const int ptr[], const int row[], c
     Inertia inertia;
     memset(info, 0, sizeof *info);
     *fkeep = NULL;
-    if (!factor(handle->analysis, val, control->u, control->small, &handle->factors, &inertia)) {
+    if (!factor(handle->analysis, val, control->u, control->small, threads, &handle->factors, &inertia)) {
         info->flag = OUT_OF_MEMORY;
         return;
     }

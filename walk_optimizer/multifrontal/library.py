@@ -40,6 +40,17 @@ def factorization_library() -> Path | None:
     return library
 
 
+def use_threads(count: int) -> None:
+    """Let factorisations make use of so many processors, where there is the library.
+
+    Args:
+        count: At least 1; more than 2 are not used.
+    """
+    library = factorization_library()
+    if library is not None:
+        ctypes.CDLL(str(library)).use_threads(count)
+
+
 def _loads(library: Path) -> bool:
     try:
         ctypes.CDLL(str(library))

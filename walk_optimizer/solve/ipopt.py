@@ -6,9 +6,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from walk_optimizer.multifrontal.library import factorization_library
+from walk_optimizer.multifrontal.library import factorization_library, use_threads
 from walk_optimizer.solve.back_end import SolveOptions, refused_start
 from walk_optimizer.solve.instances import Instances
+from walk_optimizer.solve.sharing import free_processors
 from walk_optimizer.solve.solution import FloatArray, Monitor, Solution
 from walk_optimizer.solve.status import Status
 from walk_optimizer.solve.watcher import Watcher
@@ -117,6 +118,7 @@ def solve(
     if (refusal := refused_start(start)) is not None:
         return refusal
     instance = _instances.of(problem.nlp, options, lambda: _Instance(problem.nlp, options))
+    use_threads(free_processors())
     instance.watcher.begin(problem, monitor)
     try:
         result = instance.solver(

@@ -7,6 +7,7 @@ import os
 import signal
 import warnings
 from collections.abc import Callable
+from contextvars import ContextVar
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, TypeVar
@@ -16,6 +17,9 @@ _One = TypeVar("_One")
 # How often a process that waits for others asks whether to go on, in [s].
 _PERIOD = 0.1
 _PR_SET_PDEATHSIG = 1
+
+# How many other processes have a share of the work that is going on here.
+_OTHERS: ContextVar[int] = ContextVar("others", default=0)
 
 
 def die_with_parent() -> None:
@@ -58,7 +62,9 @@ class Shares(Generic[_One]):
             stopped: Whether to leave the rest, asked after each piece and while waiting for others.
             waiting: Called again and again while this process waits for others.
         """
-        forks = [self._fork() for _ in range(min(processes, self._count) - 1)]
+        others = max(0, min(processes, self._count) - 1)
+        before = _OTHERS.set(_OTHERS.get() + others)
+        forks = [self._fork() for _ in range(others)]
         try:
             results = self._taken(stopped)
             for _, connection in forks:
@@ -72,6 +78,7 @@ class Shares(Generic[_One]):
                 process.kill()
                 process.join()
                 connection.close()
+            _OTHERS.reset(before)
         return results
 
     def _taken(self, stopped: Callable[[], bool]) -> dict[int, _One]:
@@ -109,6 +116,11 @@ def _received(connection: "Connection[Any, Any]") -> dict[int, Any]:
     except EOFError:
         return {}
     return results
+
+
+def free_processors() -> int:
+    """Return how many processors a piece of work may use: those that no other process of it is busy on."""
+    return max(1, processor_count() - _OTHERS.get())
 
 
 def processor_count() -> int:
