@@ -1,5 +1,6 @@
-"""The row of the landing speed: only where a walker bounds it, and the same on both grids."""
+"""Margins of a walker: the row of its landing speed, and the load on the foot that stands, on both grids."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -89,3 +90,30 @@ def test_the_refined_grid_has_the_same_row_before_the_duration(request_of_three_
     row = dense(problem.nlp.jacobian(x, problem.parameters)[0]).ravel()[-2]
     last = x[refined.variables.last_state_columns()] * refined.variables.state_unit
     assert row == pytest.approx(-normal_speed(landing_walker, last[:6], last[6:]), rel=1e-9)
+
+
+def test_the_stance_foot_carries_its_load_after_the_impact(request_of_three_points, walker):
+    loaded = replace(walker, stance_load=0.2)
+    asked = replace(request_of_three_points, points=5)
+    for problem in (
+        fixed_schedule_problem(asked, loaded, single_impact(5)),
+        complementarity_problem(asked, loaded, 1e-8),
+    ):
+        lower, _ = from_scaled(loaded, problem.lower_x)
+        least = 0.2 * loaded.weight
+        np.testing.assert_allclose(lower[17], [0.0, 0.0, least, least, least])
+        np.testing.assert_array_equal(lower[20], 0.0)
+
+
+def test_on_a_slope_any_allowed_vertical_force_loads_the_foot_enough(request_of_three_points, walker):
+    loaded = replace(walker, stance_load=0.2)
+    refined = RefinedProblem(request_of_three_points, loaded, even_mesh([phases_of(single_impact(10))], 2))
+    with np.errstate(invalid="ignore"):
+        forces = refined.unpack(refined.problem().lower_x).forces
+    vertical = forces[0, 0, 1]
+    np.testing.assert_allclose(forces[:, :, 1], vertical)
+    np.testing.assert_array_equal(forces[:, :, 3], 0.0)
+    # The least normal force that a force within the cone may have there: it leans uphill the most.
+    slope, cone = loaded.terrain.slope, math.atan(loaded.friction_coefficient)
+    length = vertical / math.cos(slope - cone)
+    assert length * math.cos(cone) == pytest.approx(0.2 * loaded.weight, rel=1e-12)
