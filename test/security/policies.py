@@ -17,21 +17,6 @@ RULES = {
 }
 
 
-@dataclass(frozen=True)
-class Profile:
-    """What a node may do.
-
-    Attributes:
-        enclave: Path of its enclave.
-        node: Full name of the node.
-        allowed: Full names by what may be done with them: publish, subscribe, reply...
-    """
-
-    enclave: str
-    node: str
-    allowed: dict[str, frozenset[str]]
-
-
 def load_policy():
     """The policy file with the parts that it includes."""
     tree = etree.parse(str(POLICY))
@@ -39,26 +24,22 @@ def load_policy():
     return tree
 
 
-def profiles():
-    """The profiles by enclave."""
-    found = {}
-    for enclave in load_policy().iterfind("enclaves/enclave"):
-        for profile in enclave.iterfind("profiles/profile"):
-            found[enclave.get("path")] = _profile(enclave.get("path"), profile)
-    return found
+def enclaves():
+    """What an enclave may do, by its path: full names by publish, subscribe, reply..."""
+    return {enclave.get("path"): _allowed(enclave) for enclave in load_policy().iterfind("enclaves/enclave")}
 
 
-def _profile(enclave, profile):
-    namespace, node = profile.get("ns").rstrip("/"), profile.get("node")
+def _allowed(enclave):
     allowed = {rule: set() for rules in RULES.values() for rule in rules}
-    for kind, rules in RULES.items():
-        for group in profile.iterfind(kind):
-            for rule in rules:
-                if group.get(rule) == "ALLOW":
-                    allowed[rule] |= {_full(one.text.strip(), namespace, node) for one in group}
-    return Profile(
-        enclave, f"{namespace}/{node}", {rule: frozenset(names) for rule, names in allowed.items()}
-    )
+    for profile in enclave.iterfind("profiles/profile"):
+        namespace, node = profile.get("ns").rstrip("/"), profile.get("node")
+        for kind, rules in RULES.items():
+            for group in profile.iterfind(kind):
+                names = {_full(one.text.strip(), namespace, node) for one in group}
+                for rule in rules:
+                    if group.get(rule) == "ALLOW":
+                        allowed[rule] |= names
+    return allowed
 
 
 def _full(name, namespace, node):

@@ -1,6 +1,9 @@
 """Each node may do exactly what it does: the policies beside the graph of the running nodes."""
 
 import os
+import subprocess
+import sys
+from fnmatch import fnmatchcase
 
 import pytest
 
@@ -11,8 +14,10 @@ pytest.importorskip("tf2_msgs")
 from lxml import etree
 from nodes.graph import PATIENCE
 from rclpy.action import get_action_server_names_and_types_by_node
-from security.policies import POLICY, RULES, XML_BASE, load_policy, problems, profiles
+from rclpy.node import Node
+from security.policies import POLICY, RULES, XML_BASE, enclaves, load_policy, problems
 from tf2_msgs.msg import TFMessage
+from walk_optimizer_interfaces.srv import StopRecording
 
 from walk_optimizer.cli.processes import NodeProcess
 
@@ -92,7 +97,7 @@ def test_sros2_makes_signed_permissions_of_the_policy(tmp_path):
     made = {
         f"/{path.parent.relative_to(tmp_path / 'enclaves')}" for path in tmp_path.rglob("permissions.p7s")
     }
-    assert made == set(profiles())
+    assert made == set(enclaves())
 
 
 @pytest.fixture(scope="module")
@@ -127,17 +132,14 @@ def done_by(node, name):
     return done
 
 
-@pytest.mark.ros
-@pytest.mark.parametrize("name", NODES)
-def test_a_node_may_do_exactly_what_it_does(graph, nodes, name):
-    allowed = profiles()[f"/walk_optimizer/{name}"].allowed
-    # Of robot_state_publisher: a recorder takes it where there is one.
-    graph.node.create_publisher(TFMessage, "/tf_static", 1)
+def require_exactly_what_it_does(graph, enclave, node):
+    """Wait until a node does what its enclave may do, and nothing else."""
+    allowed = enclaves()[f"/walk_optimizer/{enclave}"]
 
     def differences():
-        if (name, "/") not in graph.node.get_node_names_and_namespaces():
+        if (node, "/") not in graph.node.get_node_names_and_namespaces():
             return {"node": "not there"}
-        done = done_by(graph.node, name)
+        done = done_by(graph.node, node)
         return {
             rule: {"not allowed": done[rule] - allowed[rule], "not done": allowed[rule] - done[rule]}
             for rule in allowed
@@ -145,34 +147,88 @@ def test_a_node_may_do_exactly_what_it_does(graph, nodes, name):
         }
 
     try:
-        graph.spin_until(lambda: not differences(), f"the policy of {name}", patience=PATIENCE / 6)
+        graph.spin_until(lambda: not differences(), f"the policy of {node}", patience=PATIENCE / 6)
     except AssertionError:
         assert differences() == {}
 
 
+@pytest.mark.ros
+@pytest.mark.parametrize("name", NODES)
+def test_a_node_may_do_exactly_what_it_does(graph, nodes, name):
+    # Of robot_state_publisher: a recorder takes it where there is one.
+    graph.node.create_publisher(TFMessage, "/tf_static", 1)
+    require_exactly_what_it_does(graph, name, name)
+
+
+@pytest.mark.ros
+def test_the_bag_player_may_do_exactly_what_playing_takes(graph, nodes):
+    transforms = graph.node.create_publisher(TFMessage, "/tf_static", 1)
+    graph.spin_until(transforms.get_subscription_count, "a recording of /tf_static")
+    bag = graph.call(StopRecording, "reference_publisher/stop_recording").directory
+    command = [sys.executable, "-m", "walk_optimizer.cli.main", "bag", "play", bag, "--delay", str(PATIENCE)]
+    player = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    try:
+        require_exactly_what_it_does(graph, "bag_player", "walk_optimizer_bag_player")
+    finally:
+        player.kill()
+        player.wait()
+
+
+# Nodes that people start, with the enclaves of their policies.
+TOOLS = {
+    "operator": "operator",
+    "_ros2cli_1234": "operator",
+    "_ros2cli_requester_std_srvs_Trigger": "operator",
+    "foxglove_bridge": "operator",
+    "rviz": "operator",
+    "teleop_twist_keyboard": "operator",
+    "transform_listener_impl_55d0c8a3b2f0": "operator",
+    "controller": "controller",
+}
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("name", TOOLS)
+def test_tools_may_do_what_any_node_does_at_its_start(graph, name):
+    allowed = enclaves()[f"/walk_optimizer/{TOOLS[name]}"]
+    node = Node(name)
+    done = done_by(node, name)
+    node.destroy_node()
+    assert len(done["reply"]) == 7
+    for rule, names in done.items():
+        assert all(any(fnmatchcase(one, pattern) for pattern in allowed[rule]) for one in names), rule
+
+
 # What the other side of a name does.
 OPPOSITE = {"publish": "subscribe", "subscribe": "publish", "request": "reply", "call": "execute"}
-COMMON = {"/clock", "/parameter_events", "/rosout", "/diagnostics"}
+COMMON = {"/clock", "/parameter_events", "/rosout", "/diagnostics", "/tf_static"}
 
 
 @pytest.mark.parametrize("enclave", ["operator", "controller"])
 def test_people_and_controllers_may_do_only_what_a_node_is_there_for(enclave):
-    everybody = profiles()
-    own = everybody[f"/walk_optimizer/{enclave}"].allowed
-    suite = [everybody[f"/walk_optimizer/{name}"].allowed for name in NODES]
+    everybody = enclaves()
+    own = everybody[f"/walk_optimizer/{enclave}"]
+    suite = [everybody[f"/walk_optimizer/{name}"] for name in NODES]
     for rule, other in OPPOSITE.items():
         offered = set().union(*(allowed[other] for allowed in suite))
         assert own[rule] <= offered | COMMON
-    assert not own["reply"]
     assert not own["execute"]
 
 
-def test_nobody_but_the_publisher_publishes_references():
-    for enclave, profile in profiles().items():
-        publishes = {name for name in profile.allowed["publish"] if name.startswith("/reference_publisher/")}
+@pytest.mark.parametrize("enclave", ["operator", "controller"])
+def test_people_and_controllers_can_not_pose_as_a_node(enclave):
+    everybody = enclaves()
+    patterns = everybody[f"/walk_optimizer/{enclave}"]["reply"]
+    offered = set().union(*(everybody[f"/walk_optimizer/{name}"]["reply"] for name in NODES))
+    assert not [name for name in offered for pattern in patterns if fnmatchcase(name, pattern)]
+
+
+def test_nobody_but_publisher_and_bag_player_publishes_references():
+    for enclave, allowed in enclaves().items():
+        publishes = {name for name in allowed["publish"] if name.startswith("/reference_publisher/")}
         if enclave == "/walk_optimizer/operator":
             assert publishes == {"/reference_publisher/cmd_vel", "/reference_publisher/target_speed"}
-        elif enclave != "/walk_optimizer/reference_publisher":
+        elif enclave not in ("/walk_optimizer/reference_publisher", "/walk_optimizer/bag_player"):
             assert not publishes
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "test"))
 
-from security.policies import Profile, profiles  # noqa: E402
+from security.policies import enclaves  # noqa: E402
 
 REFERENCES = "rt/reference_publisher/joint_reference"
 PUBLISHER, OPERATOR = "/walk_optimizer/reference_publisher", "/walk_optimizer/operator"
@@ -43,9 +43,9 @@ def endpoints(rule: str, name: str) -> set[Endpoint]:
     return set().union(*(endpoints(kind, f"{name}/_action/{part}") for kind, part in parts))
 
 
-def allowed_by(profile: Profile) -> set[Endpoint]:
-    """Return all writers and readers of a profile, with those that rmw itself needs."""
-    rules = [endpoints(rule, name) for rule, names in profile.allowed.items() for name in names]
+def allowed_by(allowed: dict[str, set[str]]) -> set[Endpoint]:
+    """Return all writers and readers of an enclave, with those that rmw itself needs."""
+    rules = [endpoints(rule, name) for rule, names in allowed.items() for name in names]
     return set().union(*rules, {(rule, "ros_discovery_info") for rule in ("publish", "subscribe")})
 
 
@@ -103,7 +103,7 @@ def main() -> int:
     """Check, and return whether everything was as the policy says."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("keystore", type=Path)
-    wanted = {enclave: allowed_by(profile) for enclave, profile in profiles().items()}
+    wanted = {path: allowed_by(allowed) for path, allowed in enclaves().items()}
     names = {name for endpoints in wanted.values() for _, name in endpoints}
     tried = {(rule, name) for rule in ("publish", "subscribe") for name in names}
     right = True
