@@ -138,6 +138,5 @@ def _print_table(args: argparse.Namespace) -> int:
 
 def _friction(args: argparse.Namespace) -> float | None:
     """Return the friction coefficient of the ground; None for that of the gait's walker."""
-    return (
-        None if args.friction is None else parse_number(args.friction, "friction", "without unit", above=0.0)
-    )
+    text = args.friction
+    return None if text is None else parse_number(text, "friction", "without unit", above=0.0)
