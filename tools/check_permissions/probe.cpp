@@ -52,13 +52,14 @@ struct NumberType : TopicDataType
   bool getKey(void *, InstanceHandle_t *, bool) override { return false; }
 };
 
-// A participant without shared memory, in which another version of Fast DDS would be met.
+// A participant on this machine alone, without shared memory, in which another version of Fast DDS would be met.
 DomainParticipantQos stranger()
 {
   DomainParticipantQos qos;
   qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(
-    std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
+  auto transport = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+  transport->interfaceWhiteList.push_back("127.0.0.1");
+  qos.transport().user_transports.push_back(transport);
   return qos;
 }
 
