@@ -1,9 +1,11 @@
 """docs/walking.md says what the program measures."""
 
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
 
+from walk_optimizer.cli.text import markdown_line
 from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.simulation import settings as module
 from walk_optimizer.simulation.ending import Ending
@@ -13,22 +15,29 @@ from walk_optimizer.simulation.table import HEADINGS, orbit_cells
 PAGE = Path(__file__).parents[2] / "docs" / "walking.md"
 
 
-def documented_rows() -> dict[tuple[str, ...], tuple[str, ...]]:
-    """Cells after speed and springs, by speed and springs."""
-    lines = [line.strip("| \n") for line in PAGE.read_text().splitlines() if line.startswith("| ")]
-    rows = [tuple(cell.strip() for cell in line.split("|")) for line in lines]
-    assert rows[0] == HEADINGS
-    return {row[:2]: row[2:] for row in rows[2:]}
+def documented_rows(number: int) -> dict[tuple[str, ...], tuple[str, ...]]:
+    """Cells after speed and springs of a table of walks on the page, by speed and springs."""
+    _, *after = PAGE.read_text().split(markdown_line(HEADINGS))
+    lines = takewhile(lambda line: line.startswith("| "), after[number].splitlines()[2:])
+    rows = [tuple(cell.strip() for cell in line.strip("| \n").split("|")) for line in lines]
+    return {row[:2]: row[2:] for row in rows}
 
 
 def test_the_table_holds_every_gait_and_what_is_measured_now(loop):
-    rows = documented_rows()
+    rows = documented_rows(0)
     assert len(rows) == 21
     row = rows["1.50", "stiffness_and_equilibrium"]
     assert row[:3] == orbit_cells(loop)
     assert (row[3] == "yes") is (loop.walk(5).ending is Ending.LANDED)
     fatal = loop.disturbance(push=float(row[4]) + 1.0)
     assert loop.walk(loop.settings.disturbed_step + 8, fatal).ending.is_fall
+
+
+def test_with_margins_every_gait_of_the_table_walks():
+    without, within = documented_rows(0), documented_rows(1)
+    assert set(within) == set(without)
+    assert {cells[3] for cells in within.values()} == {"yes"}
+    assert "slipped" in {cells[3] for cells in without.values()}
 
 
 def test_impossible_settings_are_refused_with_their_name(tmp_path, monkeypatch):
