@@ -17,7 +17,7 @@ from report import machine, ratio, save_section, seconds, table
 from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.guess import kinematic_guess
 from walk_optimizer.mesh_adaptation import resampled
-from walk_optimizer.refinement import REMESHED
+from walk_optimizer.refinement import BARRIER
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.resolve import mesh_of
 from walk_optimizer.solve import ipopt
@@ -75,7 +75,7 @@ def refined_case(speed: float, mode: str) -> Case:
     refined = RefinedProblem(faster, walker(), mesh)
     points = resampled(gait.refined.trajectory, gait.refined.spring, mesh, mesh)
     name = f"refined, {mode}, {mesh.intervals} intervals"
-    return Case(name, refined.problem(), refined.pack(points), REMESHED)
+    return Case(name, refined.problem(), refined.pack(points), BARRIER)
 
 
 def measured(case: Case, further: tuple) -> tuple[float, int, float]:

@@ -34,9 +34,8 @@ _MOST_PHASES = 6
 _ROUNDS = 6
 # Contact phases that the continuous problem does not have never converge; others need far fewer.
 _MOST_ITERATIONS = 200
-# Barrier parameters for a start from the report's grid, and from a refined solution.
-FROM_GRID = 1e-5
-REMESHED = 1e-6
+# Barrier parameter for a start from the report's grid, or from another refined solution.
+BARRIER = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,14 +109,14 @@ def refine(gait: Gait, session: SolveSession) -> RefinedSolution:
 
 def _begun(solves: "RefinedSolves", first: "FirstGuess", mesh: Mesh) -> RefinedSolution:
     """Return the solution on an initial mesh, solved again without phases that shrink to nothing."""
-    solution = solves.solved(mesh, first.points(mesh), FROM_GRID)
+    solution = solves.solved(mesh, first.points(mesh))
     if solution.trajectory is None:
         return solution
     lasting = without_vanished(mesh, solution.trajectory.breaks)
     if lasting == mesh.phases:
         return solution
     mesh = even_mesh([lasting], _FEWEST_INTERVALS)
-    return solves.solved(mesh, first.points(mesh), FROM_GRID)
+    return solves.solved(mesh, first.points(mesh))
 
 
 class RefinedSolves:
@@ -145,20 +144,19 @@ class RefinedSolves:
             if errors.met:
                 return replace(best, met=True)
             finer = errors.divided(mesh)
-            best = self.solved(finer, resampled(trajectory, best.spring, mesh, finer), REMESHED)
+            best = self.solved(finer, resampled(trajectory, best.spring, mesh, finer))
         return best
 
-    def solved(self, mesh: Mesh, points: RefinedPoints, barrier: float) -> RefinedSolution:
+    def solved(self, mesh: Mesh, points: RefinedPoints) -> RefinedSolution:
         """Return the solution on one mesh.
 
         Args:
             mesh: Phases and intervals.
             points: First guess.
-            barrier: First barrier parameter.
         """
         refined = RefinedProblem(self.request, self.walker, mesh)
         unit = torque_unit(self.walker) ** 2 / self.request.interval
-        options = replace(self.session.options, barrier=barrier, maximum_iterations=_MOST_ITERATIONS)
+        options = replace(self.session.options, barrier=BARRIER, maximum_iterations=_MOST_ITERATIONS)
         solution = self.session.solve(
             refined.problem(), refined.pack(points), "refinement", objective_unit=unit, options=options
         )

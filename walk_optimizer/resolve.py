@@ -14,7 +14,7 @@ from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import Gait, RefinedGait
 from walk_optimizer.mesh_adaptation import resampled
 from walk_optimizer.model.parameters import KneeSpring
-from walk_optimizer.refinement import REMESHED, RefinedSolves, certified_refinement
+from walk_optimizer.refinement import RefinedSolves, certified_refinement
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
@@ -47,7 +47,7 @@ def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSess
     guess = _between(guesses[0], guesses[-1], _share(request, neighbours))
     walker = neighbours[0].walker
     solves = RefinedSolves(request, walker, session)
-    solution = solves.solved(mesh, guess, REMESHED)
+    solution = solves.solved(mesh, guess)
     gait = certified_refinement(walker, request, solution)
     return gait or certified_refinement(walker, request, solves.adapted(solution))
 

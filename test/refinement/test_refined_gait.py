@@ -8,7 +8,7 @@ import pytest
 from walk_optimizer.gait import Gait, RefinedGait
 from walk_optimizer.mesh_adaptation import resampled
 from walk_optimizer.refined_certificate import certify_refined
-from walk_optimizer.refinement import REMESHED, RefinedSolves, refine
+from walk_optimizer.refinement import RefinedSolves, refine
 from walk_optimizer.replay import replay_step
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
@@ -32,7 +32,7 @@ def test_a_mesh_twice_as_fine_changes_its_effort_by_less_than_a_thousandth(
     assert solution.trajectory is not None
     finer = solution.mesh.divided(np.full(solution.mesh.intervals, 2))
     start = resampled(solution.trajectory, solution.spring, solution.mesh, finer)
-    again = RefinedSolves(gait.request, gait.walker, session).solved(finer, start, REMESHED)
+    again = RefinedSolves(gait.request, gait.walker, session).solved(finer, start)
     assert again.effort == pytest.approx(solution.effort, rel=1e-3)
 
 

@@ -10,7 +10,7 @@ from walk_optimizer.contact.schedule import FootMode, single_impact
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import optimize
 from walk_optimizer.refined_certificate import certify_refined
-from walk_optimizer.refinement import FROM_GRID, FirstGuess, RefinedSolves
+from walk_optimizer.refinement import FirstGuess, RefinedSolves
 from walk_optimizer.replay import contact_modes
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
@@ -48,7 +48,7 @@ def test_the_slip_is_certified_by_the_law_of_friction(slippery):
 def test_following_the_slip_needs_less_torque_than_single_support(slippery):
     solves = RefinedSolves(REQUEST, slippery.walker, SolveSession(solver_settings(), 300.0, None))
     mesh = even_mesh([phases_of(single_impact(REQUEST.points))], fewest=3)
-    plain = solves.solved(mesh, FirstGuess(slippery).points(mesh), FROM_GRID)
+    plain = solves.solved(mesh, FirstGuess(slippery).points(mesh))
     assert slippery.refined.trajectory.torque_effort < 0.9 * plain.effort
 
 

@@ -48,7 +48,7 @@ def test_a_step_beyond_the_legs_is_infeasible():
     lower_g = problem.lower_g.copy()
     lower_g[-1] = 2.5
     start = to_scaled(walker, kinematic_guess(walker, request, GuessShape()), KneeSpring())
-    solution = solve(replace(problem, lower_g=lower_g), start, SolveOptions())
+    solution = solve(replace(problem, lower_g=lower_g), start, SolveOptions(maximum_iterations=2000))
     assert solution.status is Status.INFEASIBLE
     assert solution.infeasibility > 0.01
 

@@ -28,6 +28,8 @@ _STATUS = {
 # First barrier parameter for a start that may be far from a solution. From kinematic guesses larger ones,
 # and IPOPT's adaptive choice, end in worse optima more often, and some solves take several times as long.
 _FAR_BARRIER = 1e-4
+# A start that is near a solution is moved off its bounds by no more than this part of their distance.
+_LARGEST_PUSH = 1e-4
 
 
 @dataclass(frozen=True)
@@ -74,11 +76,21 @@ def _settings(options: SolveOptions) -> dict[str, Any]:
 
 
 def _strategy(barrier: float | None) -> dict[str, Any]:
-    """Return how the barrier parameter goes down from its first value, None for a start that may be far."""
+    """Return how the barrier parameter begins and goes down: from `barrier`, None for a far start."""
     if barrier is None:
         return {"mu_strategy": "monotone", "mu_init": _FAR_BARRIER, "expect_infeasible_problem": "yes"}
-    push = min(1e-6, 10 * barrier)
-    return {"mu_strategy": "monotone", "mu_init": barrier, "bound_push": push, "bound_frac": push}
+    push = min(_LARGEST_PUSH, 10 * barrier)
+    return {
+        "mu_strategy": "adaptive",
+        "mu_init": barrier,
+        "mu_max": 10 * barrier,
+        "bound_push": push,
+        "bound_frac": push,
+        # Multipliers of bounds as they are at this barrier parameter, not all alike; those of rows come
+        # with the first iteration, better than from least squares with the others.
+        "bound_mult_init_method": "mu-based",
+        "constr_mult_init_max": 0.0,
+    }
 
 
 class _Instance:
