@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+
+# The package imports it when a replay first needs it; times are without imports.
+import scipy.integrate  # noqa: F401
 from numpy.typing import NDArray
 from plain_refined import PlainRefined, phases_of
 from plain_transcription import FixedSchedule, PlainSolution, kinematic_points, search, with_free_contacts

@@ -1,10 +1,11 @@
 """What a good engineer writes in an afternoon: the report's problem in plain CasADi `Opti` with IPOPT.
 
 The measuring stick of `speed.py`. Variables and rows are scaled, derivatives are exact and CasADi's own,
-nothing is generated or compiled, and IPOPT gets the options that the package gives it. It takes from the
-package the walker's symbolic mechanics (`model/`: velocities, momentum rates, foot positions) and the
-kinematic first guesses; the transcription shares no code with it. Mechanics written down as the gradient of
-the Hamiltonian took as long, within the noise of the measurement.
+nothing is generated or compiled. IPOPT has its adaptive barrier for far starts and a small first one for
+near starts, and bounds that are not widened. It takes from the package the walker's symbolic mechanics
+(`model/`: velocities, momentum rates, foot positions) and the kinematic first guesses; the transcription
+shares no code with it. Mechanics written down as the gradient of the Hamiltonian took as long, within the
+noise of the measurement.
 """
 
 from collections.abc import Sequence

@@ -26,9 +26,10 @@ TITLE = """\
 
 Made by `.venv/bin/python benchmarks/speed.py`; each section ends with the machine and the load that it
 began with. *Plain* is `benchmarks/plain_transcription.py` and `plain_refined.py`: the same walker, grid,
-bounds, first guesses, tolerances and IPOPT options in CasADi's `Opti`, with CasADi's own exact derivatives
-and nothing compiled. It takes the walker's symbolic mechanics and the first guesses from the package, not
-its transcription.
+bounds, first guesses and tolerances in CasADi's `Opti`, with CasADi's own exact derivatives, nothing
+compiled, and IPOPT's adaptive barrier for far starts and a small first one for near starts. How the barrier
+and multipliers begin is part of what is compared. It takes the walker's symbolic mechanics and the first
+guesses from the package, not its transcription.
 
 Each solve has a process of its own. Times are wall times that include building the problem, but not
 importing packages. A ratio is the plain time over ours; several are averaged by the geometric mean. F is
