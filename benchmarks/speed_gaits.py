@@ -45,7 +45,7 @@ compiled yet*. One start: the faster of two runs; searches: one run."""
 def cold(bench: Bench) -> str:
     """Compare single requests from nothing: one start, and the whole search."""
     rows: list[list[str]] = []
-    of_start, of_search = [], []
+    ratios: dict[str, list[float]] = {}
     for request in sampled_requests():
         name = name_of(request)
         for text, free in (("contacts given", False), ("contacts free", True)):
@@ -55,17 +55,16 @@ def cold(bench: Bench) -> str:
                 bench(one, request, free, time_limit=ONE_SOLVE, label=label, times=2) for one in functions
             ]
             rows.append(_compared(name, f"one start, {text}", *pair))
-        of_start.append(quotients(pair[1], pair[0])[0])
+            ratios.setdefault(f"One start, {text}", []).append(quotients(pair[1], pair[0])[0])
         plain = bench(measure.plain_search, request, time_limit=WHOLE_SEARCH, label=name)
         ours = bench(measure.ours_search, request, time_limit=ONE_SOLVE, label=name)
         bare = bench(measure.ours_search_without_cache, request, time_limit=ONE_SOLVE, label=name)
         rows.append(_compared(name, "whole search", ours, plain))
         rows.append(_compared(name, "the same, nothing compiled yet", bare, plain))
-        of_search.append(quotients(plain, ours)[0])
-    first = verdict("10 times faster. One start with free contacts", of_start, 10)
-    second = verdict("the same for the whole search", of_search, 10)
+        ratios.setdefault("Whole search", []).append(quotients(plain, ours)[0])
     header = ["request", "what", "ours", "plain", "ratio", "of processor time"]
-    return f"{first} {second}\n\n{COLD_NOTE}\n\n{table(header, rows)}"
+    verdicts = " ".join(verdict(f"10 times faster. {what}", values, 10) for what, values in ratios.items())
+    return f"{verdicts}\n\n{COLD_NOTE}\n\n{table(header, rows)}"
 
 
 def _compared(name: str, what: str, ours: Measured, plain: Measured) -> list[str]:

@@ -4,9 +4,7 @@ They are the best of a search with many starts, and their continuation keeps wha
 half the time of a search for the new speed alone, and its optima are as good or better.
 """
 
-import time
 from collections.abc import Sequence
-from typing import Any
 
 from walk_optimizer.gait import Gait
 from walk_optimizer.library import GaitLibrary
@@ -14,8 +12,8 @@ from walk_optimizer.library_selection import EXACT_SPEED_TOLERANCE, is_on_line
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.solve.settings import solver_settings
-from walk_optimizer.solve.status import Status
+from walk_optimizer.solve.settings import SolverSettings, solver_settings
+from walk_optimizer.solve.status import ProgressCallback, Status
 
 # Whoever ended a solve so does not want another.
 _ENDED = (Status.CANCELLED, Status.TIME_LIMIT)
@@ -26,8 +24,9 @@ def optimize_from(
     request: GaitRequest,
     walker: WalkerParameters,
     *,
+    settings: SolverSettings | None = None,
     time_limit: float | None = None,
-    **options: Any,
+    progress: ProgressCallback | None = None,
 ) -> Outcome:
     """Solve for the gait of least torque, from its neighbours in a library if it has any.
 
@@ -35,21 +34,30 @@ def optimize_from(
         library: Of the walker.
         request: Speed, step, spring mode and grid.
         walker: The walker.
+        settings: Of the search; the packaged ones by default.
         time_limit: In [s], above 0; the settings' by default.
-        options: `settings` and `progress` as for `optimize`.
+        progress: Called at every iteration; returning False cancels the solve.
 
     Raises:
         InvalidRequestError: the time limit is not above 0.
     """
+    settings = settings or solver_settings()
+    limit = settings.time_limit if time_limit is None else time_limit
     seeds = neighbours(library.gaits(), request)
-    begin = time.monotonic()
     if seeds:
-        outcome = optimize(request, walker, time_limit=time_limit, seeds=seeds, from_scratch=False, **options)
+        outcome = optimize(
+            request,
+            walker,
+            settings=settings,
+            time_limit=limit,
+            progress=progress,
+            seeds=seeds,
+            from_scratch=False,
+        )
         if outcome.gait is not None or outcome.report.status in _ENDED:
             return outcome
-        limit = solver_settings().time_limit if time_limit is None else time_limit
-        time_limit = max(limit - (time.monotonic() - begin), 1e-3)
-    return optimize(request, walker, time_limit=time_limit, **options)
+        limit = max(limit - outcome.report.solve_time, 1e-3)
+    return optimize(request, walker, settings=settings, time_limit=limit, progress=progress)
 
 
 def neighbours(gaits: Sequence[Gait], request: GaitRequest) -> list[Gait]:

@@ -68,7 +68,7 @@ def test_neighbours_that_lead_to_nothing_are_followed_by_a_search_unless_it_was_
 ):
     asked = []
 
-    def failing(request, walker, *, time_limit, seeds=(), from_scratch=True):
+    def failing(request, walker, *, time_limit, seeds=(), from_scratch=True, **_others):
         asked.append((len(seeds), from_scratch, time_limit))
         return Outcome(None, SolveReport(status, status.sentence, "ipopt"))
 

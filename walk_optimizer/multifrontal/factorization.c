@@ -51,44 +51,33 @@ static const Workspace *written(const Task *task, int f) {
     return &task->factors->parts[task->analysis->part_of[f]];
 }
 
-/* Append those unknowns to a list whose home is front f, or those that have another; return the end. */
-static int *append(int *to, const int *unknowns, int count, const int *home, int f, int at_home) {
-    for (int k = 0; k < count; k++)
-        if ((home[unknowns[k]] <= f) == at_home) *to++ = unknowns[k];
-    return to;
-}
-
-/* List the unknowns of front f: candidates for pivots, which are its own and those delayed by its children,
- * then its border. Those that an ancestor eliminated the last time are not tried: they come after the others.
- * Returns the number of candidates that are, -1 when memory runs out. */
+/* List the unknowns of front f: its pivots, those delayed by its children, its border.
+ * Returns the number of candidates for pivots, -1 when memory runs out. */
 static int list_unknowns(Task *task, int f) {
     const Analysis *analysis = task->analysis;
     const AssemblyTree *tree = analysis->tree;
     Factors *factors = task->factors;
     Integers *indices = &task->own->indices;
     Front *front = &factors->fronts[f];
-    int own = tree->pivot_begin[f + 1] - tree->pivot_begin[f];
+    int own = tree->pivot_begin[f + 1] - tree->pivot_begin[f], candidates = own;
     int border = tree->border_begin[f + 1] - tree->border_begin[f];
-    front->delayed = own;
     for (int child = analysis->first_child[f]; child >= 0; child = analysis->sibling[child])
-        front->delayed += factors->fronts[child].delayed;
-    front->size = front->delayed + border;
+        candidates += factors->fronts[child].delayed;
+    front->size = candidates + border;
     if (!reserve_integers(indices, front->size)) return -1;
     front->unknowns = indices->used;
     indices->used += front->size;
-    int *list = indices->data + front->unknowns, *to = list, tried = 0;
-    for (int at_home = 1; at_home >= 0; at_home--) {
-        to = append(to, factors->pivots + tree->pivot_begin[f], own, factors->home, f, at_home);
-        for (int child = analysis->first_child[f]; child >= 0; child = analysis->sibling[child]) {
-            const Front *from = &factors->fronts[child];
-            const int *unknowns = written(task, child)->indices.data + from->unknowns + from->eliminated;
-            to = append(to, unknowns, from->delayed, factors->home, f, at_home);
-        }
-        if (at_home) tried = to - list;
+    int *list = indices->data + front->unknowns, *to = list + own;
+    memcpy(list, factors->pivots + tree->pivot_begin[f], own * sizeof(int));
+    for (int child = analysis->first_child[f]; child >= 0; child = analysis->sibling[child]) {
+        const Front *from = &factors->fronts[child];
+        const int *unknowns = written(task, child)->indices.data + from->unknowns + from->eliminated;
+        memcpy(to, unknowns, from->delayed * sizeof(int));
+        to += from->delayed;
     }
     memcpy(to, tree->border + tree->border_begin[f], border * sizeof(int));
     for (int i = 0; i < front->size; i++) task->own->place[list[i]] = i;
-    return tried;
+    return candidates;
 }
 
 /* Add the contribution of a child to a front. */
@@ -142,8 +131,7 @@ static void eliminate_front(Task *task, int f, int candidates) {
     DenseFront dense = {a, size, candidates, unknowns, diagonal, diagonal + size};
     Elimination done = eliminate_candidates(&dense, task->threshold, task->smallest);
     front->eliminated = done.eliminated;
-    front->delayed -= done.eliminated;
-    for (int p = 0; p < done.eliminated; p++) task->factors->home[unknowns[p]] = f;
+    front->delayed = candidates - done.eliminated;
     inertia->rank += done.eliminated;
     inertia->negative += done.negative;
     inertia->two_by_two += done.two_by_two;

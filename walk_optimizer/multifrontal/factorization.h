@@ -33,7 +33,7 @@ int factor(const Analysis *analysis, const double *values, double threshold, dou
            Factors **factors, Inertia *inertia);
 void free_factors(Factors *factors);
 
-/* Forget the scales, the order of pivots and the delays that earlier matrices have left behind. */
+/* Forget the scales and the order of pivots that earlier matrices have left behind. */
 void forget(const Analysis *analysis, Factors *factors);
 
 /* Solve in place for one right-hand side x[n]. */

@@ -105,14 +105,13 @@ void free_factors(Factors *factors) {
         free(part->values.data), free(part->stack.data), free(part->indices.data);
         free(part->place), free(part->places);
     }
-    free(factors->fronts), free(factors->pivots), free(factors->home);
-    free(factors->piece), free(factors->scale), free(factors->largest);
+    free(factors->fronts), free(factors->pivots), free(factors->piece);
+    free(factors->scale), free(factors->largest);
     free(factors);
 }
 
 void forget(const Analysis *analysis, Factors *factors) {
     memcpy(factors->pivots, analysis->tree->pivots, (size_t)analysis->tree->n * sizeof(int));
-    memcpy(factors->home, analysis->front_of, (size_t)analysis->tree->n * sizeof(int));
     for (int i = 0; i < analysis->tree->n; i++) factors->scale[i] = 1.0;
 }
 
@@ -122,12 +121,11 @@ Factors *new_factors(const Analysis *analysis) {
     if (factors == NULL) return NULL;
     factors->fronts = malloc(((size_t)analysis->tree->front_count + 1) * sizeof(Front));
     factors->pivots = malloc(n * sizeof(int));
-    factors->home = malloc(n * sizeof(int));
     factors->piece = malloc(n * sizeof(double));
     factors->scale = malloc(n * sizeof(double));
     factors->largest = malloc(n * sizeof(double));
-    int fine = factors->fronts != NULL && factors->pivots != NULL && factors->home != NULL &&
-               factors->piece != NULL && factors->scale != NULL && factors->largest != NULL;
+    int fine = factors->fronts != NULL && factors->pivots != NULL && factors->piece != NULL &&
+               factors->scale != NULL && factors->largest != NULL;
     for (int k = 0; k < PARTS; k++) {
         factors->parts[k].place = malloc(n * sizeof(int));
         factors->parts[k].places = malloc(n * sizeof(int));

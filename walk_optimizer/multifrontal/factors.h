@@ -52,7 +52,6 @@ struct Factors {
     Workspace parts[PARTS];
     double *scale;   /* [n] */
     int *pivots;     /* [n] those of the tree, within each front in the order of the last time */
-    int *home;       /* [n] front that eliminated an unknown the last time */
     double *piece;   /* [n] of a right-hand side */
     double *largest; /* [n] scaled entry of a column */
 };
