@@ -64,8 +64,9 @@ class Shares(Generic[_One]):
         """
         others = max(0, min(processes, self._count) - 1)
         before = _OTHERS.set(_OTHERS.get() + others)
-        forks = [self._fork() for _ in range(others)]
+        forks: list[tuple[BaseProcess, Connection[Any, Any]]] = []
         try:
+            forks.extend(self._fork() for _ in range(others))
             results = self._taken(stopped)
             for _, connection in forks:
                 while not stopped():
