@@ -82,18 +82,20 @@ def summary(trials: Sequence[Trial]) -> str:
             f"- time of a request, one after the other: median {np.median(times):.1f} s, "
             f"90 % {np.quantile(times, 0.9):.1f} s, largest {times.max():.1f} s"
         ),
-        "",
-        "| seed | step [m] | step [s] | springs | N | what is missing |",
-        "|---|---|---|---|---|---|",
     ]
-    for one in trials:
-        gait = one.outcome.gait
-        if gait is None or gait.refined is None:
-            missing = one.outcome.report.message if gait is None else "refinement"
-            lines.append(
-                f"| {one.seed} | {one.request.step_length:.3f} | {one.request.step_time:.3f} "
-                f"| {one.request.spring_mode.value} | {one.request.points} | {missing} |"
-            )
+    short = [one for one in trials if one.outcome.gait is None or one.outcome.gait.refined is None]
+    if short:
+        lines += [
+            "",
+            "| seed | step [m] | step [s] | springs | N | what is missing |",
+            "|---|---|---|---|---|---|",
+        ]
+    for one in short:
+        missing = one.outcome.report.message if one.outcome.gait is None else "refinement"
+        lines.append(
+            f"| {one.seed} | {one.request.step_length:.3f} | {one.request.step_time:.3f} "
+            f"| {one.request.spring_mode.value} | {one.request.points} | {missing} |"
+        )
     return "\n".join(lines) + "\n"
 
 
