@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from walk_optimizer.contact.feet import contact_pairs, net_force
+from walk_optimizer.contact.feet import contact_pairs, net_force, reaction_cones
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.model.symbolic import SymbolicWalker
 
@@ -107,3 +107,10 @@ def test_net_force_is_forward_less_backward_and_normal_of_each_foot():
     )
     force = np.asarray(ca.evalf(force))
     np.testing.assert_array_equal(force, [[3, -3], [10, 20]])
+
+
+def test_friction_cones_have_two_sides_for_each_net_force():
+    walker, reaction = SymbolicWalker(), ca.SX.sym("reaction", 6)
+    cones = ca.Function("cones", [reaction, walker.symbols], [reaction_cones(walker, reaction)])
+    sides = cones([30, 80, 100, 20, 0, 800], WALKER.vector())
+    np.testing.assert_array_equal(np.ravel(sides), [50 + 50, 50 - 50, 400 - 20, 400 + 20])

@@ -20,22 +20,30 @@ def net_force(walker: SymbolicWalker, reaction: ca.SX) -> ca.SX:
     return ca.horzcat(*(ground.horizontal_and_vertical(walker, one[0] - one[1], one[2]) for one in feet))
 
 
-def cone_sides(walker: SymbolicWalker, reaction: ca.SX) -> ca.SX:
-    """Return how far the net force of each foot is inside its friction cone, (4,) in [N].
+def cone_sides(walker: SymbolicWalker, tangential: ca.SX, normal: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return how far a force is inside the friction cone of the ground, in [N].
+
+    Args:
+        walker: The walker.
+        tangential: Its component along the surface in [N].
+        normal: Its component normal to it in [N].
+
+    Returns:
+        mu times the normal force, less and plus the tangential force.
+    """
+    limit = walker.friction_coefficient * normal
+    return limit - tangential, limit + tangential
+
+
+def reaction_cones(walker: SymbolicWalker, reaction: ca.SX) -> ca.SX:
+    """Return the `cone_sides` of the net force of foot 1, then of foot 2, (4,) in [N].
 
     Args:
         walker: The walker.
         reaction: lambda, (6,), in [N].
-
-    Returns:
-        mu times the normal force, less and plus the tangential force; of foot 1, then of foot 2.
     """
-    sides = []
-    for leg in range(2):
-        forward, backward, normal = (reaction[3 * leg + k] for k in range(3))
-        limit = walker.friction_coefficient * normal
-        sides += [limit - (forward - backward), limit + (forward - backward)]
-    return ca.vertcat(*sides)
+    feet = (reaction[3 * leg : 3 * leg + 3] for leg in range(2))
+    return ca.vertcat(*(side for one in feet for side in cone_sides(walker, one[0] - one[1], one[2])))
 
 
 def foot_contact(

@@ -5,7 +5,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
-from walk_optimizer.contact.feet import cone_sides, contact_pairs, net_force
+from walk_optimizer.contact.feet import contact_pairs, net_force, reaction_cones
 from walk_optimizer.model import dynamics
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.transcription import layout
@@ -47,7 +47,7 @@ def physical_rows() -> ca.Function:
     pairs = contact_pairs(walker, point.q, qdot, point.reaction, point.slip_speed)
     rows = euler_rows(state, previous, ca.vertcat(qdot, pdot), interval, pairs)
     inputs = [column, previous, spring, interval, walker.symbols]
-    return ca.Function("physical_rows", inputs, [ca.vertcat(rows, cone_sides(walker, point.reaction))])
+    return ca.Function("physical_rows", inputs, [ca.vertcat(rows, reaction_cones(walker, point.reaction))])
 
 
 def euler_functions() -> list[ca.Function]:

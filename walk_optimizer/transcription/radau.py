@@ -10,6 +10,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
+from walk_optimizer.contact.feet import cone_sides
 from walk_optimizer.model import dynamics, ground
 from walk_optimizer.model.kinematics import foot_position
 from walk_optimizer.model.symbolic import SymbolicWalker
@@ -48,8 +49,7 @@ def contact_rows(walker: SymbolicWalker, q: ca.SX, qdot: ca.SX, force: ca.SX) ->
     cones = []
     for leg in range(2):
         tangential, normal = ground.along_and_normal(walker, force[2 * leg : 2 * leg + 2])
-        limit = walker.friction_coefficient * normal
-        cones += [limit - tangential, limit + tangential]
+        cones += cone_sides(walker, tangential, normal)
     gaps = [ground.gap(walker, foot) for foot in feet]
     return ca.vertcat(*gaps, *(v[0] for v in velocities), *(v[1] for v in velocities), *cones)
 
