@@ -18,12 +18,14 @@ from pathlib import Path
 
 import casadi
 import numpy as np
+from report import table
 
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize
 from walk_optimizer.request import GaitRequest, gait_table_settings
 
 TIME_LIMIT = 120.0
+HEADINGS = ["seed", "step [m]", "step [s]", "springs", "N", "what is missing"]
 _SPREAD = math.log(1.4)
 
 
@@ -85,18 +87,16 @@ def summary(trials: Sequence[Trial]) -> str:
     ]
     short = [one for one in trials if one.outcome.gait is None or one.outcome.gait.refined is None]
     if short:
-        lines += [
-            "",
-            "| seed | step [m] | step [s] | springs | N | what is missing |",
-            "|---|---|---|---|---|---|",
-        ]
-    for one in short:
-        missing = one.outcome.report.message if one.outcome.gait is None else "refinement"
-        lines.append(
-            f"| {one.seed} | {one.request.step_length:.3f} | {one.request.step_time:.3f} "
-            f"| {one.request.spring_mode.value} | {one.request.points} | {missing} |"
-        )
+        lines += ["", table(HEADINGS, map(missing, short))]
     return "\n".join(lines) + "\n"
+
+
+def missing(trial: Trial) -> list[object]:
+    """Return the row of a request that has no gait, or none on the refined grid."""
+    request, outcome = trial.request, trial.outcome
+    what = outcome.report.message if outcome.gait is None else "refinement"
+    step = [f"{request.step_length:.3f}", f"{request.step_time:.3f}"]
+    return [trial.seed, *step, request.spring_mode.value, request.points, what]
 
 
 def main() -> None:

@@ -60,3 +60,16 @@ def test_an_unknown_part_is_refused_with_the_parts_that_there_are():
     )
     assert run.returncode == 2
     assert "unknown part colder; there are cold,table,resolve,growth,startup" in run.stderr
+
+
+def test_a_random_request_without_a_gait_stays_in_the_table_with_the_reason():
+    from random_requests import Trial, summary
+
+    from walk_optimizer.optimizer import Outcome
+    from walk_optimizer.request import GaitRequest
+    from walk_optimizer.solve.status import SolveReport, Status
+
+    report = SolveReport(Status.INFEASIBLE, "dynamics is off", "ipopt", solve_time=1.5)
+    page = summary([Trial(7, GaitRequest.for_step(0.25, 0.785, "stiffness", 40), Outcome(None, report))])
+    assert "- certified gaits: 0 of 1 (0.0 %)" in page
+    assert page.endswith("| 7 | 0.250 | 0.785 | stiffness | 40 | dynamics is off |\n")
