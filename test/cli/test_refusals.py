@@ -78,7 +78,12 @@ def test_bad_input_of_solve_is_refused_in_one_line(no_work, capsys, arguments, m
         (["picture", "--speed", "0.3", "--output", "/nowhere/gait.png"], "the folder /nowhere is missing"),
         (["library", "verify", "--folder", "/nowhere"], "/nowhere: no gait files"),
         (["library", "build", "--output", "/nowhere"], "/nowhere: the gait folder is missing"),
-        (["library", "build", "--jobs", "0"], "jobs is '0', expected a whole number of at least 1"),
+        (["library", "build", "--jobs", "0"], "jobs is '0', allowed are whole numbers of at least 1"),
+        (["library", "build", "--jobs", "two"], "jobs is 'two', allowed are whole numbers of at least 1"),
+        (
+            ["simulate", "--speed", "0.3", "--steps", "0"],
+            "steps is '0', allowed are whole numbers from 1 to 1000",
+        ),
         (["library", "build", "--points", "3"], "N is 3 grid points, allowed is 20 to 2000"),
         (["bag", "info", "/nowhere"], "/nowhere"),
         (["fly"], "invalid choice: 'fly'"),

@@ -88,15 +88,16 @@ def parse_points(text: str) -> int:
     return points
 
 
-def parse_count(text: str, name: str, most: int) -> int:
+def parse_count(text: str, name: str, most: int | None = None) -> int:
     """Return a number of things.
 
     Raises:
-        InvalidRequestError: the text is no whole number from 1 to `most`.
+        InvalidRequestError: the text is no whole number from 1 to `most`, where that is given.
     """
     count = _whole(text)
-    if count is None or not 1 <= count <= most:
-        raise InvalidRequestError(f"{name} is {text!r}, allowed are whole numbers from 1 to {most}")
+    if count is None or count < 1 or (most is not None and count > most):
+        allowed = "of at least 1" if most is None else f"from 1 to {most}"
+        raise InvalidRequestError(f"{name} is {text!r}, allowed are whole numbers {allowed}")
     return count
 
 

@@ -11,9 +11,15 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from walk_optimizer.cli.arguments import Subparsers, add_verb, add_walker, parse_points, walker_from
+from walk_optimizer.cli.arguments import (
+    Subparsers,
+    add_verb,
+    add_walker,
+    parse_count,
+    parse_points,
+    walker_from,
+)
 from walk_optimizer.cli.terminal import StatusLine
-from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.request import KMH_PER_MS, gait_table_settings
 
 if TYPE_CHECKING:
@@ -54,7 +60,8 @@ def add_parser(actions: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Build the table; 1 when entries are missing."""
-    jobs, walker = _parse_jobs(args.jobs), walker_from(args)
+    jobs = (os.cpu_count() or 1) if args.jobs is None else parse_count(args.jobs, "jobs")
+    walker = walker_from(args)
     points = None if args.points is None else parse_points(args.points)
 
     from walk_optimizer.gait_files.access import writable_folder
@@ -149,15 +156,6 @@ def minutes(seconds: float) -> str:
     """Return a duration in [s] as minutes and seconds."""
     whole = round(seconds)
     return f"{whole // 60}:{whole % 60:02d} min"
-
-
-def _parse_jobs(text: str | None) -> int:
-    """Return the number of processes; raise InvalidRequestError when it is none."""
-    if text is None:
-        return os.cpu_count() or 1
-    if not text.isdecimal() or int(text) < 1:
-        raise InvalidRequestError(f"jobs is {text!r}, expected a whole number of at least 1")
-    return int(text)
 
 
 @contextmanager
