@@ -46,7 +46,7 @@ def contact_rows(walker: SymbolicWalker, q: ca.SX, qdot: ca.SX, force: ca.SX) ->
     """
     feet = [foot_position(walker, q, leg) for leg in range(2)]
     velocities = [ground.along_and_normal(walker, ca.jtimes(foot, q, qdot)) for foot in feet]
-    cones = []
+    cones: list[ca.SX] = []
     for leg in range(2):
         tangential, normal = ground.along_and_normal(walker, force[2 * leg : 2 * leg + 2])
         cones += cone_sides(walker, tangential, normal)
