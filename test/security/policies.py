@@ -1,6 +1,6 @@
 """The security policies as SROS2 reads them: who may do what, with full names."""
 
-from dataclasses import dataclass
+from pathlib import Path
 
 from lxml import etree
 
@@ -8,6 +8,8 @@ from walk_optimizer.resources import config_file
 
 FOLDER = config_file("walker.yaml").resolve().parents[1] / "security"
 POLICY = FOLDER / "walk_optimizer.policy.xml"
+SCHEMA = Path(__file__).with_name("sros2") / "policy.xsd"
+INCLUDE = "{http://www.w3.org/2001/XInclude}include"
 
 # Kind of names and what may be done with them.
 RULES = {
@@ -48,60 +50,22 @@ def _full(name, namespace, node):
     return f"{namespace}/{node}{name[1:]}" if name.startswith("~") else f"{namespace}/{name}"
 
 
-@dataclass(frozen=True)
-class Element:
-    """What the format of policies, version 0.2.0, says of an element.
+class _WithoutInternet(etree.Resolver):
+    """What policy.xsd uses of the schema that it imports from www.w3.org."""
 
-    Attributes:
-        children: Elements it may contain; none for those that contain a name.
-        required: Attributes it must have.
-        optional: Attributes it may have.
-        may_be_empty: Whether it may contain nothing.
-    """
-
-    children: frozenset[str] = frozenset()
-    required: frozenset[str] = frozenset()
-    optional: frozenset[str] = frozenset()
-    may_be_empty: bool = False
+    def resolve(self, url, _public_id, context):
+        if url != "http://www.w3.org/2001/03/xml.xsd":
+            return None
+        return self.resolve_string(
+            """<schema xmlns="http://www.w3.org/2001/XMLSchema"
+                targetNamespace="http://www.w3.org/XML/1998/namespace">
+            <attribute name="base" type="anyURI"/></schema>""",
+            context,
+        )
 
 
-def _element(children="", required="", optional="", **rest):
-    return Element(*(frozenset(names.split()) for names in (children, required, optional)), **rest)
-
-
-FORMAT = {
-    "policy": _element("enclaves", required="version"),
-    "enclaves": _element("enclave"),
-    "enclave": _element("profiles", required="path"),
-    "profiles": _element("profile metadata", optional="type"),
-    "profile": _element(" ".join(RULES), required="ns node", may_be_empty=True),
-    **{kind: _element(kind[:-1], optional=" ".join(rules)) for kind, rules in RULES.items()},
-    **{kind[:-1]: _element() for kind in RULES},
-}
-VALUES = {"version": {"0.2.0"}} | {rule: {"ALLOW", "DENY"} for rules in RULES.values() for rule in rules}
-XML_BASE = "{http://www.w3.org/XML/1998/namespace}base"
-
-
-def problems(element):
-    """What of an element is not as the format says."""
-    if element.tag not in FORMAT:
-        return [f"unknown element {element.tag}"]
-    wanted, found = FORMAT[element.tag], _wrong_attributes(element)
-    children = list(element.iterchildren(tag=etree.Element))
-    found += [f"{child.tag} in {element.tag}" for child in children if child.tag not in wanted.children]
-    if wanted.children and not children and not wanted.may_be_empty:
-        found.append(f"{element.tag} without {' or '.join(sorted(wanted.children))}")
-    if not wanted.children and not (element.text or "").strip():
-        found.append(f"{element.tag} without a name")
-    return found + [problem for child in children for problem in problems(child)]
-
-
-def _wrong_attributes(element):
-    wanted = FORMAT[element.tag]
-    found = [f"{element.tag} without {name}" for name in sorted(wanted.required - set(element.keys()))]
-    for name, value in element.items():
-        if name not in wanted.required | wanted.optional | {XML_BASE}:
-            found.append(f"{element.tag}: {name}")
-        elif value not in VALUES.get(name, {value}):
-            found.append(f"{element.tag}: {name}={value}")
-    return found
+def published_schema():
+    """The schema by which SROS2 validates policies."""
+    parser = etree.XMLParser()
+    parser.resolvers.add(_WithoutInternet())
+    return etree.XMLSchema(etree.parse(str(SCHEMA), parser))

@@ -8,96 +8,19 @@ from fnmatch import fnmatchcase
 import pytest
 
 pytest.importorskip("rclpy")
-pytest.importorskip("lxml")
 pytest.importorskip("tf2_msgs")
 
-from lxml import etree
 from nodes.graph import PATIENCE
 from rclpy.action import get_action_server_names_and_types_by_node
 from rclpy.node import Node
-from security.policies import POLICY, RULES, XML_BASE, enclaves, load_policy, problems
+from security.policies import enclaves
 from tf2_msgs.msg import TFMessage
 from walk_optimizer_interfaces.srv import StopRecording
 
 from walk_optimizer.cli.processes import NodeProcess
 
 NODES = ("gait_optimizer", "gait_library", "reference_publisher", "walker_visualizer")
-NEEDS_SROS2 = "needs the package sros2 of a ROS distribution"
 PARTS = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
-
-
-def test_the_policy_has_the_format_of_sros2():
-    root = load_policy().getroot()
-    assert problems(root) == []
-    # sros2 takes every child of <enclaves> for an enclave, comments too.
-    assert all(isinstance(child.tag, str) for child in root.find("enclaves"))
-
-
-def test_the_policy_only_allows():
-    groups = [group for kind in RULES for group in load_policy().iter(kind)]
-    assert {value for group in groups for name, value in group.items() if name != XML_BASE} == {"ALLOW"}
-
-
-# Changes of the policy, each with what the check says of it.
-MISTAKES = {
-    "version": (lambda policy: policy.set("version", "0.1.0"), "policy: version=0.1.0"),
-    "no enclaves": (lambda policy: policy.remove(policy[0]), "policy without enclaves"),
-    "no path": (lambda policy: policy[0][0].attrib.pop("path"), "enclave without path"),
-    "no node": (lambda policy: a_profile(policy).attrib.pop("node"), "profile without node"),
-    "attribute": (lambda policy: policy[0][0].set("kind", "x"), "enclave: kind"),
-    "rule": (lambda policy: topics(policy).set("call", "ALLOW"), "topics: call"),
-    "qualifier": (lambda policy: topics(policy).set("publish", "allow"), "topics: publish=allow"),
-    "kind of name": (lambda policy: etree.SubElement(topics(policy), "service"), "service in topics"),
-    "element": (lambda policy: etree.SubElement(a_profile(policy), "topcis"), "unknown element topcis"),
-    "no names": (lambda policy: topics(policy).clear(), "topics without topic"),
-}
-
-
-def a_profile(policy):
-    return next(policy.iter("profile"))
-
-
-def topics(policy):
-    return next(policy.iter("topics"))
-
-
-@pytest.mark.parametrize("mistake", MISTAKES)
-def test_the_check_of_the_format_finds_what_is_wrong(mistake):
-    change, found = MISTAKES[mistake]
-    policy = load_policy().getroot()
-    change(policy)
-    assert found in problems(policy)
-
-
-def test_the_check_of_the_format_finds_names_left_out():
-    policy = load_policy().getroot()
-    topics(policy)[0].text = " "
-    assert problems(policy) == ["topic without a name"]
-
-
-@pytest.mark.parametrize("mistake", MISTAKES)
-def test_the_schema_of_sros2_refuses_what_the_check_of_the_format_does(mistake, tmp_path):
-    policy = pytest.importorskip("sros2.policy", reason=NEEDS_SROS2)
-    root = load_policy().getroot()
-    MISTAKES[mistake][0](root)
-    wrong = tmp_path / "wrong.policy.xml"
-    wrong.write_bytes(etree.tostring(root))
-    with pytest.raises(RuntimeError):
-        policy.load_policy(wrong)
-
-
-def test_the_policy_is_valid_by_the_schema_of_sros2():
-    policy = pytest.importorskip("sros2.policy", reason=NEEDS_SROS2)
-    assert policy.load_policy(POLICY) is not None
-
-
-def test_sros2_makes_signed_permissions_of_the_policy(tmp_path):
-    generation = pytest.importorskip("sros2.api._artifact_generation", reason=NEEDS_SROS2)
-    generation.generate_artifacts(tmp_path, [], [POLICY])
-    made = {
-        f"/{path.parent.relative_to(tmp_path / 'enclaves')}" for path in tmp_path.rglob("permissions.p7s")
-    }
-    assert made == set(enclaves())
 
 
 @pytest.fixture(scope="module")
