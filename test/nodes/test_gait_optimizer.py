@@ -95,9 +95,11 @@ def test_refusals_say_what_the_core_says_and_the_node_lives_on(graph, optimizer)
             GaitRequest.for_speed(**fields)
         answer = graph.call(OptimizeGait, SERVICE, **fields)
         assert (answer.success, answer.message) == (False, str(refusal.value))
+        assert (answer.report.status, answer.report.message) == ("refused", answer.message)
         status, result = Goal(graph, **fields).result()
         assert status == GoalStatus.STATUS_ABORTED
         assert (result.success, result.message) == (False, str(refusal.value))
+        assert (result.report.status, result.report.message) == ("refused", result.message)
     answer = graph.call(OptimizeGait, SERVICE, speed=SPEED, spring_mode="none", time_limit=-1.0)
     assert (answer.success, "time limit is -1 s" in answer.message) == (False, True)
     assert optimizer.exit_code is None
@@ -246,6 +248,7 @@ def test_a_full_queue_is_answered_politely(graph, own_optimizer):
     answer = graph.call(OptimizeGait, f"own/{SERVICE}", **ENDLESS | {"points": 1997})
     assert not answer.success
     assert answer.message == "busy: 2 solves are waiting, no more than 2 may; ask again later"
+    assert (answer.report.status, answer.report.message) == ("refused", answer.message)
 
 
 def test_a_flood_is_answered_to_the_last_request(graph, own_optimizer):

@@ -1,7 +1,9 @@
 """Reports, rows of the table and progress survive being messages."""
 
 import math
+import re
 from dataclasses import fields
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +13,7 @@ from library.made_up_gait import made_up_gait
 
 from walk_optimizer.library_entries import LibraryEntry, Source, summarize
 from walk_optimizer.nodes.conversions import (
+    REFUSED,
     progress_to_message,
     report_from_message,
     report_to_message,
@@ -23,6 +26,12 @@ def test_a_report_survives_the_message():
     violations = (FamilyViolation("dynamics", 2.5, "N"), FamilyViolation("speed", 0.1, "m/s"))
     report = SolveReport(Status.INFEASIBLE, "no", "ipopt", "kinematic", 3, 41, 1.25, 7.5, violations)
     assert report_from_message(report_to_message(report)) == report
+
+
+def test_the_message_documents_every_word_for_how_a_solve_ended():
+    source = Path(__file__).resolve().parents[2] / "walk_optimizer_interfaces" / "msg" / "SolverReport.msg"
+    words = re.search(r"# status: (.*?) when", source.read_text(), re.DOTALL)[1]
+    assert set(re.findall(r"\w+", words)) == {*map(str, Status), REFUSED}
 
 
 def test_a_row_of_the_table_keeps_every_value(tmp_path):

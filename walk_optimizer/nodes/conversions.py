@@ -15,7 +15,7 @@ from walk_optimizer_interfaces.msg import GaitSummary as GaitSummaryMessage
 from walk_optimizer_interfaces.msg import RefinedStep
 from walk_optimizer_interfaces.msg import SolverReport as SolverReportMessage
 
-from walk_optimizer.errors import GaitFileError
+from walk_optimizer.errors import GaitFileError, WalkOptimizerError
 from walk_optimizer.gait import Certificate, CertificateEntry, Gait, RefinedGait, Trajectory
 from walk_optimizer.gait_files.checks import positive
 from walk_optimizer.gait_files.refined import REFINED_PREFIX, ROW_SHAPES, refined_trajectory
@@ -24,6 +24,9 @@ from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParame
 from walk_optimizer.profile import EulerProfile
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import FamilyViolation, Progress, SolveReport, Status
+
+# Status of a report where no solve was started.
+REFUSED = "refused"
 
 # Field of the message, attribute of the trajectory, rows.
 _ARRAYS = (
@@ -174,6 +177,11 @@ def report_to_message(report: SolveReport) -> SolverReportMessage:
     """Return a solver report as a message."""
     columns = _columns(report.violations, ("family", "violation", "unit"))
     return _message(SolverReportMessage, report, status=report.status.value, **columns)
+
+
+def refusal_to_message(error: WalkOptimizerError) -> SolverReportMessage:
+    """Return the report on a request that was refused before a solve started."""
+    return SolverReportMessage(status=REFUSED, message=str(error), objective=math.nan)
 
 
 def report_from_message(message: SolverReportMessage) -> SolveReport:

@@ -1,6 +1,8 @@
 """Node `gait_optimizer`: solves for gaits in worker processes, by service and by action."""
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from rclpy.action import ActionServer, CancelResponse
@@ -10,7 +12,12 @@ from walk_optimizer_interfaces.srv import OptimizeGait
 
 from walk_optimizer.background import GaitJob, outcome_of, solve_job, submit_gait
 from walk_optimizer.errors import InvalidRequestError, SolveFailedError, WalkOptimizerError
-from walk_optimizer.nodes.conversions import gait_to_message, progress_to_message, report_to_message
+from walk_optimizer.nodes.conversions import (
+    gait_to_message,
+    progress_to_message,
+    refusal_to_message,
+    report_to_message,
+)
 from walk_optimizer.nodes.optimizer_health import OptimizerHealth
 from walk_optimizer.nodes.parameters import Setting
 from walk_optimizer.nodes.running import run_node
@@ -95,7 +102,9 @@ class GaitOptimizerNode(SuiteNode):
         super().destroy_node()
 
     async def _answer(self, request: OptimizeGait.Request, response: OptimizeGait.Response) -> None:
-        await self._fill(response, submit_gait(self._pool, self._job(request)))
+        with _refusal_reported(response):
+            ticket = submit_gait(self._pool, self._job(request))
+        await self._fill(response, ticket)
 
     def _job(self, request: Any) -> GaitJob:
         """Return the job of a service request or an action goal."""
@@ -142,12 +151,13 @@ class GaitOptimizerNode(SuiteNode):
         Raises:
             WalkOptimizerError: there is no gait.
         """
-        job = self._job(goal.request)
+        with _refusal_reported(result):
+            job = self._job(goal.request)
 
-        def tell(progress: Progress) -> None:
-            goal.publish_feedback(progress_to_message(progress, job.time_limit))
+            def tell(progress: Progress) -> None:
+                goal.publish_feedback(progress_to_message(progress, job.time_limit))
 
-        ticket = submit_gait(self._pool, job, lambda progress: self.later(tell, progress))
+            ticket = submit_gait(self._pool, job, lambda progress: self.later(tell, progress))
         key = bytes(goal.goal_id.uuid)
         self._tickets[key] = ticket
         timer = self.repeat(_FEEDBACK_PERIOD, lambda: tell(ticket.progress))
@@ -164,6 +174,16 @@ class GaitOptimizerNode(SuiteNode):
         if ticket is not None:
             ticket.cancel()
         return CancelResponse.ACCEPT
+
+
+@contextmanager
+def _refusal_reported(answer: Any) -> Iterator[None]:
+    """Have a service response or an action result say so when no solve starts."""
+    try:
+        yield
+    except WalkOptimizerError as error:
+        answer.report = refusal_to_message(error)
+        raise
 
 
 def main() -> int:
