@@ -97,6 +97,31 @@ def test_a_stream_of_speeds_that_falls_silent_ends_in_a_stand(graph, walker, joi
     graph.spin_until(walks, "the walk again")
 
 
+def test_parts_of_a_velocity_that_a_planar_walker_can_not_follow_are_ignored_and_told(
+    graph, walker, publisher
+):
+    velocity = walker.talk(Twist, "cmd_vel")
+    turning = Twist(linear=Vector3(x=FAST, y=0.25), angular=Vector3(z=-0.5))
+
+    def walks():
+        velocity.publish(turning)
+        return walker.states[-1].state == "walking" and walker.states[-1].speed == pytest.approx(FAST)
+
+    graph.spin_until(walks, "the walk")
+    told = (
+        "~/cmd_vel: linear.y=0.25, angular.z=-0.5 ignored: the walker is planar, it can only follow linear.x"
+    )
+    assert publisher.output().count(told) == 1
+
+    # A speed in a message that is wrong elsewhere neither counts nor keeps the stream alive.
+    broken = Twist(linear=Vector3(x=FAST), angular=Vector3(y=math.inf))
+    graph.spin_until(lambda: velocity.publish(broken) or walker.states[-1].state == "standing", "the stand")
+    refused = (
+        "target speed refused: a velocity has angular.y=inf, allowed are finite numbers in all its parts"
+    )
+    assert refused in publisher.output()
+
+
 def test_pause_and_resume(graph, walker, joints):
     walker.walk(FAST)
     walker.trigger("pause")

@@ -8,8 +8,9 @@ from rclpy.timer import Timer
 from std_msgs.msg import Float64
 
 from walk_optimizer.command_watch import CommandWatch
-from walk_optimizer.errors import WalkOptimizerError
+from walk_optimizer.errors import InvalidRequestError, WalkOptimizerError
 from walk_optimizer.nodes.lifecycle import ManagedNode
+from walk_optimizer.nodes.planar_twist import IgnoredParts, forward_speed
 from walk_optimizer.nodes.qos import COMMAND
 from walk_optimizer.nodes.qos_warnings import warn_of_publishers
 from walk_optimizer.nodes.walk_commands import SupersededError, WalkCommands
@@ -54,6 +55,7 @@ class SpeedCommands:
         self._current: _Target | None = None
         self._refused: tuple[_Target, float] | None = None
         self._following = False
+        self._ignored = IgnoredParts()
         self._timer: Timer | None = None
         for kind, topic, callback in (
             (Float64, "~/target_speed", self._on_target_speed),
@@ -70,13 +72,13 @@ class SpeedCommands:
         self._watch_no_more()
 
     def _on_target_speed(self, message: Float64) -> None:
-        target = self._target(message.data)
+        target = self._target(message.data) if self._node.active else None
         if target is not None:
             self._watch_no_more()
             self._take(target)
 
     def _on_twist(self, message: Twist) -> None:
-        target = self._target(message.linear.x)
+        target = self._twist_target(message) if self._node.active else None
         if target is not None:
             self.watch.heard(self._now())
             # Only now: each time that the executor wakes costs the stream a tick at 1 kHz.
@@ -84,10 +86,20 @@ class SpeedCommands:
                 self._timer = self._node.repeat(_WATCH_PERIOD, self._look)
             self._take(target)
 
+    def _twist_target(self, message: Twist) -> _Target | None:
+        """Return what a velocity asks for, and warn of what it asks for in vain; None where it is refused."""
+        try:
+            speed = forward_speed(message)
+        except InvalidRequestError as error:
+            self._tell_refusal(error)
+            return None
+        warning = self._ignored.warning(message, time.monotonic())
+        if warning is not None:
+            self._node.get_logger().warning(f"~/cmd_vel: {warning}")
+        return self._target(speed)
+
     def _target(self, speed: float) -> _Target | None:
         """Return what a speed in [m/s] asks for; None where it is refused."""
-        if not self._node.active:
-            return None
         if speed == 0:
             return _STAND
         try:
