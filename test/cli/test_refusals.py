@@ -76,14 +76,14 @@ def test_bad_input_of_solve_is_refused_in_one_line(no_work, capsys, arguments, m
         (["export", "--file", "/nowhere/gait.npz"], "/nowhere/gait.npz: can't be read: No such file"),
         (["picture", "--speed", "0.3", "--output", "gait.doc"], "a picture's name ends in .png, .pdf, .svg"),
         (["picture", "--speed", "0.3", "--output", "/nowhere/gait.png"], "the folder /nowhere is missing"),
+        (
+            ["picture", "--file", "gait.npz", "--speed", "0.3", "--spring", "none", "--output", "gait.png"],
+            "--file can't be combined with --speed, --spring; leave out the one or the other",
+        ),
         (["library", "verify", "--folder", "/nowhere"], "/nowhere: no gait files"),
         (["library", "build", "--output", "/nowhere"], "/nowhere: the gait folder is missing"),
         (["library", "build", "--jobs", "0"], "jobs is '0', allowed are whole numbers of at least 1"),
         (["library", "build", "--jobs", "two"], "jobs is 'two', allowed are whole numbers of at least 1"),
-        (
-            ["simulate", "--speed", "0.3", "--steps", "0"],
-            "steps is '0', allowed are whole numbers from 1 to 1000",
-        ),
         (["library", "build", "--points", "3"], "N is 3 grid points, allowed is 20 to 2000"),
         (["bag", "info", "/nowhere"], "/nowhere"),
         (["fly"], "invalid choice: 'fly'"),

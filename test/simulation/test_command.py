@@ -3,6 +3,8 @@
 import pytest
 from cli.console import walk_optimizer
 
+from walk_optimizer.cli.main import main
+
 GAIT = ("--speed", "1.5km/h", "--spring", "stiffness_and_equilibrium")
 
 
@@ -38,3 +40,36 @@ def test_impossible_numbers_are_refused(option, value, named, tmp_path):
     assert done.returncode == 2
     assert named in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--table", *GAIT], "--table can't be combined with --speed, --spring;"),
+        (["--table", "--spring", "none"], "--table can't be combined with --spring;"),
+        (["--table", "--push", "0", "--steps", "3"], "--table can't be combined with --steps, --push;"),
+        (["--table", "--step-down", "0.01"], "--table can't be combined with --step-down;"),
+        (["--table", "--heavier", "5"], "--table can't be combined with --heavier;"),
+        (["--table", "--points", "100"], "--table can't be combined with --points;"),
+        (["--table", "--file", "gait.npz"], "--table can't be combined with --file;"),
+        (["--table", "--without-feedback"], "--table can't be combined with --without-feedback;"),
+        (["--table", "--picture", "walk.png"], "--table can't be combined with --picture;"),
+        ([*GAIT, "--without-feedback", "--push", "5"], "--without-feedback can't be combined with --push;"),
+    ],
+)
+def test_options_that_would_be_ignored_are_refused(options, named, capsys):
+    assert main(["simulate", *options]) == 2
+    printed = capsys.readouterr()
+    assert named in printed.err
+    assert (printed.out, len(printed.err.splitlines())) == ("", 1)
+
+
+def test_a_table_takes_a_library_and_friction(tmp_path, capsys, monkeypatch):
+    from walk_optimizer.simulation import table
+
+    asked = []
+    monkeypatch.setattr(table, "table_rows", lambda *given: asked.append(given) or iter(()))
+    main(["simulate", "--table", "--library", str(tmp_path), "--friction", "0.7"])
+    ((_, _, friction),) = asked
+    assert friction == 0.7
+    assert capsys.readouterr().out.startswith("| km/h | springs |")

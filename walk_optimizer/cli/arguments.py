@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeAlias
 
@@ -11,6 +12,8 @@ from walk_optimizer.request import GaitRequest, gait_table_settings, parse_speed
 
 # What `add_subparsers` returns; argparse gives the type no public name.
 Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001
+
+_SPRING = SpringMode.NONE.value
 
 
 def add_verb(verbs: Subparsers, name: str, text: str, epilog: str = "") -> argparse.ArgumentParser:
@@ -48,9 +51,8 @@ def add_request(parser: argparse.ArgumentParser, required: bool = True) -> None:
     parser.add_argument("--speed", required=required, metavar="SPEED", help="0.3185, 0.3185m/s or 1.15km/h")
     parser.add_argument(
         "--spring",
-        default=SpringMode.NONE.value,
         metavar="MODE",
-        help=f"{', '.join(mode.value for mode in SpringMode)} (default: %(default)s)",
+        help=f"{', '.join(mode.value for mode in SpringMode)} (default: {_SPRING})",
     )
     parser.add_argument("--points", metavar="N", help="grid points of a step (default: 200)")
 
@@ -71,7 +73,26 @@ def walker_from(args: argparse.Namespace) -> WalkerParameters:
 def request_from(args: argparse.Namespace) -> GaitRequest:
     """Return the validated request."""
     points = None if args.points is None else parse_points(args.points)
-    return GaitRequest.for_speed(parse_speed(args.speed), args.spring, points)
+    spring = _SPRING if args.spring is None else args.spring
+    return GaitRequest.for_speed(parse_speed(args.speed), spring, points)
+
+
+def refuse_beside(option: str, args: argparse.Namespace, names: Iterable[str]) -> None:
+    """Refuse options that would be ignored because another one is given.
+
+    Args:
+        option: The other one.
+        args: What was given.
+        names: Attributes of the options; those not given are None or False.
+
+    Raises:
+        InvalidRequestError: one of them was given.
+    """
+    given = [f"--{name.replace('_', '-')}" for name in names if getattr(args, name) not in (None, False)]
+    if given:
+        raise InvalidRequestError(
+            f"{option} can't be combined with {', '.join(given)}; leave out the one or the other"
+        )
 
 
 def parse_points(text: str) -> int:

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from typing import TypeVar
 
-from walk_optimizer.cli.arguments import request_from, walker_from
+from walk_optimizer.cli.arguments import refuse_beside, request_from, walker_from
 from walk_optimizer.cli.terminal import SolveProgress, interruptible
 from walk_optimizer.cli.text import request_text
 from walk_optimizer.errors import GaitNotFoundError, InvalidRequestError, SolveFailedError
@@ -76,6 +76,7 @@ def chosen_gait(args: argparse.Namespace) -> Gait:
     """
     walker = walker_from(args)
     if args.file is not None:
+        refuse_beside("--file", args, ("speed", "spring", "points", "library"))
         return read_gait_file(args.file, walker if args.walker else None)
     if args.speed is None:
         raise InvalidRequestError("say which gait: --speed SPEED [--spring MODE], or --file GAIT")

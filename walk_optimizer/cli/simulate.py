@@ -1,10 +1,18 @@
 """`simulate`: a gait in closed loop over many steps."""
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from walk_optimizer.cli.arguments import Subparsers, add_gait_choice, add_verb, parse_count, parse_number
+from walk_optimizer.cli.arguments import (
+    Subparsers,
+    add_gait_choice,
+    add_verb,
+    parse_count,
+    parse_number,
+    refuse_beside,
+)
 
 if TYPE_CHECKING:
     from walk_optimizer.gait import Gait
@@ -12,6 +20,8 @@ if TYPE_CHECKING:
     from walk_optimizer.simulation.walk import Disturbance, SimulatedWalk
 
 _MOST_STEPS = 1000
+# What says how a whole table is walked; all else is about one gait.
+_OF_TABLES = frozenset({"table", "walker", "library", "friction", "run"})
 
 _TEXT = """\
 walk a gait in closed loop, step after step
@@ -38,14 +48,11 @@ def add_parser(verbs: Subparsers) -> None:
     add_gait_choice(parser)
     parser.add_argument("--steps", metavar="N", help="steps to walk (default: 20)")
     parser.add_argument(
-        "--push", default="0", metavar="N_S", help="push on the hip in N s, forward positive (default: none)"
+        "--push", metavar="N_S", help="push on the hip in N s, forward positive (default: none)"
     )
-    parser.add_argument(
-        "--step-down", default="0", metavar="M", help="one step leads down by so much in m (default: 0)"
-    )
+    parser.add_argument("--step-down", metavar="M", help="one step leads down by so much in m (default: 0)")
     parser.add_argument(
         "--heavier",
-        default="0",
         metavar="PERCENT",
         help="masses are larger than the feedback knows (default: 0)",
     )
@@ -54,17 +61,24 @@ def add_parser(verbs: Subparsers) -> None:
         "--without-feedback", action="store_true", help="play the gait's torques back and nothing else"
     )
     parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the walk: png, pdf, svg")
-    parser.add_argument("--table", action="store_true", help="all gaits of the table, as Markdown")
+    parser.add_argument(
+        "--table",
+        action="store_true",
+        help="all gaits of the table, as Markdown; takes --walker, --library, --friction alone",
+    )
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Walk, and say how it went."""
     if args.table:
+        refuse_beside("--table", args, (name for name in vars(args) if name not in _OF_TABLES))
         return _print_table(args)
-    push = parse_number(args.push, "push", "in N s")
-    down = parse_number(args.step_down, "step down", "in m")
-    heavier = parse_number(args.heavier, "heavier", "in %", above=-100.0)
+    if args.without_feedback:
+        refuse_beside("--without-feedback", args, ("push", "step_down"))
+    push = _amount(args.push, "push", "in N s")
+    down = _amount(args.step_down, "step down", "in m")
+    heavier = _amount(args.heavier, "heavier", "in %", above=-100.0)
     friction = _friction(args)
 
     from walk_optimizer.cli.gaits import chosen_gait
@@ -134,6 +148,11 @@ def _print_table(args: argparse.Namespace) -> int:
     for row in table_rows(library, simulation_settings(), friction):
         print(markdown_line(row), flush=True)
     return 0
+
+
+def _amount(text: str | None, name: str, unit: str, above: float = -math.inf) -> float:
+    """Return the number of a disturbance; 0 where none is given."""
+    return 0.0 if text is None else parse_number(text, name, unit, above)
 
 
 def _friction(args: argparse.Namespace) -> float | None:
