@@ -35,7 +35,8 @@ class Outcome:
     Attributes:
         gait: The gait; None unless it was solved and certified.
         report: How the search went.
-        others: Certified gaits of other optima that were met, best first.
+        others: Certified gaits of other optima that were met, best first, without the accurate solution; none
+            unless they were asked for.
     """
 
     gait: Gait | None
@@ -53,6 +54,7 @@ def optimize(
     seeds: Sequence[Gait] = (),
     from_scratch: bool = True,
     refine: bool = True,
+    others: bool = False,
 ) -> Outcome:
     """Solve for the gait of least torque.
 
@@ -65,6 +67,7 @@ def optimize(
         seeds: Gaits of neighbouring requests to continue from.
         from_scratch: Whether to search from kinematic guesses too.
         refine: Whether to add the accurate solution on a collocation grid.
+        others: Whether to certify the other optima that are met, too.
 
     Returns:
         The gait and the report. A solve that fails gives no gait and raises nothing. A time limit that
@@ -80,10 +83,10 @@ def optimize(
     if not (from_scratch or seeds):
         raise InvalidRequestError("nothing to start from: give seeds, or search from scratch")
     session = SolveSession(settings, limit, progress)
-    outcome = _Pipeline(request, walker, settings, session).run(seeds, from_scratch=from_scratch)
+    outcome = _Pipeline(request, walker, settings, session).run(seeds, from_scratch, others)
     if outcome.gait is None or session.stopped or not refine:
         return outcome
-    return with_refinement(outcome.gait, session)
+    return replace(with_refinement(outcome.gait, session), others=outcome.others)
 
 
 def with_refinement(gait: Gait, session: SolveSession) -> Outcome:
@@ -112,7 +115,7 @@ class _Pipeline:
         self.search = Search(request, walker, session, settings.relaxation)
         self.starts = 0
 
-    def run(self, seeds: Sequence[Gait], *, from_scratch: bool) -> Outcome:
+    def run(self, seeds: Sequence[Gait], from_scratch: bool, with_others: bool) -> Outcome:
         """Return the best certified gait, or the report of why there is none."""
         if self.request.step_length > self.walker.longest_step:
             return self._out_of_reach()
@@ -126,7 +129,7 @@ class _Pipeline:
             return self._failure(candidates)
         best, *others = distinct([*freed, *optima])
         outcome = self._certified(best)
-        gaits = (self._certified(one).gait for one in others)
+        gaits = (self._certified(one).gait for one in others) if with_others else ()
         return replace(outcome, others=tuple(gait for gait in gaits if gait is not None))
 
     def _freed(self, candidate: Candidate) -> Candidate:

@@ -70,6 +70,7 @@ def _run(job: _Job) -> Outcome:
         seeds=job.seeds,
         from_scratch=job.from_scratch,
         refine=False,
+        others=True,
     )
 
 

@@ -106,3 +106,15 @@ def test_a_seed_with_less_freedom_is_never_made_worse(plain_gait, walker, mode):
     outcome = optimize(request, walker, seeds=[plain_gait], from_scratch=False)
     assert outcome.gait is not None, outcome.report.message
     assert outcome.gait.objective <= plain_gait.objective * 1.001
+
+
+def test_other_optima_come_with_the_best_where_they_are_asked_for(walker):
+    request = GaitRequest.for_speed(0.3185, STIFFNESS, 20)
+    outcome = optimize(request, walker, refine=False, others=True)
+    assert all(one.certificate.certified and one.request == request for one in outcome.others)
+    objectives = [one.objective for one in (outcome.gait, *outcome.others)]
+    assert len(objectives) > 1
+    assert objectives == sorted(objectives)
+    again = optimize(request, walker, seeds=[outcome.gait, *outcome.others], from_scratch=False, refine=False)
+    assert again.gait is not None
+    assert again.others == ()
