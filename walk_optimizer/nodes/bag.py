@@ -11,7 +11,7 @@ from rclpy.qos import QoSProfile
 from walk_optimizer.nodes.qos_warnings import warn_of_subscribers
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.recording import Recorder, RecorderSettings, TopicInfo
-from walk_optimizer.recording.errors import RecordingError
+from walk_optimizer.recording.errors import AlreadyRecordingError, NotRecordingError
 from walk_optimizer.recording.ros_messages import serialize, topic_info
 from walk_optimizer.recording.status import RecorderStatus
 
@@ -57,6 +57,8 @@ class RecordedTopic:
 class StreamBag:
     """At most one recording at a time of a node's topics.
 
+    `start` and `stop` wait for the disk: they are for one thread that has the time (`recording_control`).
+
     Attributes:
         topics: What is recorded.
         recorder: The running recording; None when there is none.
@@ -71,10 +73,11 @@ class StreamBag:
         """Begin a bag and return its recorder.
 
         Raises:
-            RecordingError: one is being recorded, or the bag can't be created.
+            AlreadyRecordingError: one is being recorded.
+            RecordingError: the bag can't be created.
         """
         if self.recorder is not None and self.recorder.status().recording:
-            raise RecordingError(f"already recording to {self.recorder.directory}; stop that first")
+            raise AlreadyRecordingError(f"already recording to {self.recorder.directory}; stop that first")
         recorder = Recorder(directory, settings)
         for topic in self.topics:
             recorder.add_topic(topic.info)
@@ -91,9 +94,9 @@ class StreamBag:
         """Close the bag and return what is in it.
 
         Raises:
-            RecordingError: nothing is being recorded.
+            NotRecordingError: nothing is being recorded.
         """
         recorder, self.recorder = self.recorder, None
         if recorder is None:
-            raise RecordingError("nothing is being recorded")
+            raise NotRecordingError("nothing is being recorded")
         return recorder.stop()

@@ -23,6 +23,9 @@ class ForeignTopics:
     """Subscribes to topics as they appear, and records the very bytes that arrive.
 
     They are recorded with the quality of service that their publishers offer.
+
+    Attributes:
+        recorder: That gets them.
     """
 
     def __init__(self, node: SuiteNode, names: Sequence[str], recorder: Recorder) -> None:
@@ -33,7 +36,7 @@ class ForeignTopics:
             names: Of topics, relative to the node's namespace or absolute.
             recorder: That was started.
         """
-        self._node, self._recorder = node, recorder
+        self._node, self.recorder = node, recorder
         self._missing = {str(node.resolve_topic_name(name)) for name in names}
         self._subscriptions: list[Subscription] = []
         self._timer = node.repeat(_LOOK_PERIOD, self._look)
@@ -70,7 +73,7 @@ class ForeignTopics:
             qos=tuple(qos_profile(publisher.qos_profile) for publisher in publishers),
         )
         message_type = message_class(kind)
-        self._recorder.add_topic(info)
+        self.recorder.add_topic(info)
         subscription = self._node.create_subscription(
             message_type,
             name,
@@ -83,7 +86,7 @@ class ForeignTopics:
 
     def _taker(self, name: str) -> Callable[[bytes], None]:
         def take(data: bytes) -> None:
-            self._recorder.write(name, data, max(self._node.get_clock().now().nanoseconds, 0))
+            self.recorder.write(name, data, max(self._node.get_clock().now().nanoseconds, 0))
 
         return take
 

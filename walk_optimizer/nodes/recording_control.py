@@ -1,6 +1,10 @@
 """Recording as operators start and stop it: two services, and the parameter `record`."""
 
+import contextlib
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import TypeVar
 
 from rclpy.parameter import Parameter
 from walk_optimizer_interfaces.srv import StartRecording, StopRecording
@@ -9,13 +13,20 @@ from walk_optimizer.errors import WalkOptimizerError
 from walk_optimizer.nodes.bag import StreamBag, new_bag_folder
 from walk_optimizer.nodes.foreign_topics import ForeignTopics
 from walk_optimizer.nodes.joint_stream import JointStream
-from walk_optimizer.nodes.lifecycle import ManagedNode
+from walk_optimizer.nodes.lifecycle import ManagedNode, NotActiveError
 from walk_optimizer.nodes.publisher_settings import recorder_settings
+from walk_optimizer.recording.errors import AlreadyRecordingError, NotRecordingError
 from walk_optimizer.recording.status import RecorderStatus
+
+_Result = TypeVar("_Result")
 
 
 class RecordingControl:
-    """Starts and stops bags. Does not own what is in them (`bag`)."""
+    """Starts and stops bags, one after the other. Does not own what is in them (`bag`).
+
+    Owns the thread that waits for the disk meanwhile: the executor never does, for it also has to carry out
+    an emergency stop.
+    """
 
     def __init__(self, node: ManagedNode, bag: StreamBag, stream: JointStream) -> None:
         """Offer the services.
@@ -27,27 +38,30 @@ class RecordingControl:
         """
         self._node, self._bag, self._stream = node, bag, stream
         self._foreign: ForeignTopics | None = None
+        self._showing = False
+        self._thread = ThreadPoolExecutor(1, "bags")
         node.serve(StartRecording, "~/start_recording", self._start)
         node.serve(StopRecording, "~/stop_recording", self._stop)
 
     def follow_parameter(self, wanted: bool) -> None:
-        """Record, or don't, as the parameter `record` says."""
-        recording = self._bag.recorder is not None
-        try:
-            if wanted and not recording:
-                self._record()
-            elif recording and not wanted:
-                self.close()
-        except WalkOptimizerError as error:
-            self._node.get_logger().error(f"record: {error}")
+        """Record, or don't, as the parameter `record` says; it is begun, and nothing is waited for."""
+        if not self._showing:
+            self._node.later(self._follow, wanted)
 
     def close(self) -> None:
-        """Close the bag, if there is one."""
-        if self._bag.recorder is not None:
-            self._end()
+        """Close the bag, if there is one, and wait for that: the node ends, or is deactivated."""
+        # Behind what is still being done: a bag that is just being begun is closed too.
+        with contextlib.suppress(NotRecordingError):
+            self._tell_closed(self._thread.submit(self._bag.stop).result())
+        self._listen_to_others()
+
+    def end(self) -> None:
+        """Close the bag and end the thread."""
+        self.close()
+        self._thread.shutdown()
 
     async def _start(self, request: StartRecording.Request, response: StartRecording.Response) -> None:
-        directory = self._record(
+        directory = await self._record(
             Path(request.directory).expanduser().absolute() if request.directory else None
         )
         self._show(True)
@@ -55,37 +69,65 @@ class RecordingControl:
         response.message = f"recording to {directory}"
 
     async def _stop(self, _request: StopRecording.Request, response: StopRecording.Response) -> None:
-        status = self._end()
+        status = await self._end()
         self._show(False)
         response.directory, response.messages = str(status.directory), status.messages
         if status.error is not None:
             raise status.error
         response.message = f"{status.messages} messages, {status.dropped} dropped"
 
-    def _record(self, directory: Path | None = None) -> Path:
+    async def _follow(self, wanted: bool) -> None:
+        if not self._node.active:
+            return  # The parameter counts from the next activation on.
+        try:
+            await (self._record() if wanted else self._end())
+        except (AlreadyRecordingError, NotRecordingError, NotActiveError):
+            return  # It is as the parameter says, or will be with the next activation.
+        except WalkOptimizerError as error:
+            self._node.get_logger().error(f"record: {error}")
+
+    async def _record(self, directory: Path | None = None) -> Path:
         """Begin a bag and return its directory."""
         parameters = self._node.parameters
         directory = directory or new_bag_folder(parameters["recording_folder"])
-        recorder = self._bag.start(directory, recorder_settings(parameters))
-        self._forget_foreign()  # Of a recording that has ended by itself.
-        self._foreign = ForeignTopics(self._node, parameters["recording_topics"], recorder)
+        settings = recorder_settings(parameters)
+        await self._done(lambda: self._bag.start(directory, settings))
+        self._listen_to_others()
         self._stream.announce_again()
         self._node.get_logger().info(f"recording to {directory}")
         return directory
 
-    def _end(self) -> RecorderStatus:
+    async def _end(self) -> RecorderStatus:
         """Close the bag and return what is in it."""
-        self._forget_foreign()
-        status = self._bag.stop()
-        self._node.get_logger().info(f"closed {status.directory} with {status.messages} messages")
+        status = await self._done(self._bag.stop)
+        self._listen_to_others()
+        self._tell_closed(status)
         return status
 
-    def _forget_foreign(self) -> None:
-        if self._foreign is not None:
+    async def _done(self, work: Callable[[], _Result]) -> _Result:
+        """Have the thread do something, and return its result."""
+        future = self._thread.submit(work)
+        await self._node.finished(future)
+        return future.result()
+
+    def _listen_to_others(self) -> None:
+        """Listen to the topics of other nodes for the bag that there is now, and for no other."""
+        recorder = self._bag.recorder
+        if self._foreign is not None and self._foreign.recorder is not recorder:
             self._foreign.close()
-        self._foreign = None
+            self._foreign = None
+        if recorder is not None and self._foreign is None:
+            self._foreign = ForeignTopics(self._node, self._node.parameters["recording_topics"], recorder)
+
+    def _tell_closed(self, status: RecorderStatus) -> None:
+        self._node.get_logger().info(f"closed {status.directory} with {status.messages} messages")
 
     def _show(self, running: bool) -> None:
         """Make the parameter `record` say what a service did."""
-        if self._node.parameters["record"] != running:
+        if self._node.parameters["record"] == running:
+            return
+        self._showing = True
+        try:
             self._node.set_parameters([Parameter("record", value=running)])
+        finally:
+            self._showing = False

@@ -63,7 +63,7 @@ class ReferencePublisherNode(ManagedNode):
         self._speeds = SpeedCommands(self, self._commands)
         self._recording = RecordingControl(self, self._bag, self._stream)
         health = PublisherHealth(self.diagnostics, self._stream, self._speeds, self._bag)
-        for end in (planner.close, health.close, self._recording.close, self._stream.stop):
+        for end in (planner.close, health.close, self._recording.end, self._stream.stop):
             self._undo.callback(end)
         self.serve(SetGait, "~/set_gait", self._set_gait)
         self.serve(GetJointTrajectory, "~/joint_trajectory", self._joint_trajectory)
@@ -111,6 +111,8 @@ class ReferencePublisherNode(ManagedNode):
 
     async def _emergency_stop(self, _request: Trigger.Request, response: Trigger.Response) -> None:
         self._stream.walk.clock.stop_at_once()
+        self._speeds.give_up()
+        self._commands.give_up()
         response.message = "holds its pose without torques; ~/resume releases, and once more goes on"
         self.get_logger().warning("emergency stop")
 

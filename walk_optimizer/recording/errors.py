@@ -11,6 +11,14 @@ class RecordingSettingsError(RecordingError, ConfigurationError):
     """A recorder setting lies outside of its range."""
 
 
+class AlreadyRecordingError(RecordingError):
+    """There is a recording already, and at most one at a time."""
+
+
+class NotRecordingError(RecordingError):
+    """There is no recording that could be stopped."""
+
+
 class BagExistsError(RecordingError):
     """The directory to record into is already there; bags are never overwritten."""
 
