@@ -71,6 +71,13 @@ class SpeedCommands:
         self._waiting = self._current = None
         self._watch_no_more()
 
+    def give_up(self) -> None:
+        """Drop what was asked for, because of an emergency stop; a stream must go on none the less.
+
+        If it does not, the walk that goes on after the emergency comes to a stand.
+        """
+        self._waiting = self._current = None
+
     def _on_target_speed(self, message: Float64) -> None:
         target = self._target(message.data) if self._node.active else None
         if target is not None:

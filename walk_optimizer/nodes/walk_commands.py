@@ -22,11 +22,32 @@ _RETRY_PERIOD = 1.0
 
 
 class SupersededError(WalkOptimizerError):
-    """A later command came before this one could begin."""
+    """A later command, or an emergency stop, came before this one could begin."""
 
 
 class EmergencyStopError(WalkOptimizerError):
     """The emergency stop is still in force."""
+
+
+class _Order:
+    """A command for as long as it is carried out."""
+
+    def __init__(self) -> None:
+        """Count, until `end`."""
+        self._end = ""
+
+    def end(self, reason: str) -> None:
+        """Count no more, for the first of the reasons that are given."""
+        self._end = self._end or reason
+
+    def require_valid(self) -> None:
+        """Refuse to go on with what does not count any more.
+
+        Raises:
+            SupersededError: says why.
+        """
+        if self._end:
+            raise SupersededError(self._end)
 
 
 class WalkCommands:
@@ -58,7 +79,7 @@ class WalkCommands:
         settings = transition_settings()
         self._standing = standing_pose(walker, settings.feet_distance, settings.knee_bend)
         self.limits = JointLimits()
-        self._newest = 0
+        self._order = _Order()
 
     def begin(self) -> StandProfile:
         """Return what the stream begins with."""
@@ -90,14 +111,14 @@ class WalkCommands:
         self._require_no_emergency()
         order = self._take_order()
         gait, source = await self._fetch(request, order if wait_for_library else None)
-        self._require_newest(order)
+        order.require_valid()
         peaks = peaks_of([gait.profile])
         self.limits.require(peaks)
         try:
             await self._planner.plan(gait, self._stand_after(gait), self._torque_limit)
             await self._lead_to(gait, order)
         except NoTransitionError:
-            self._require_newest(order)  # Then a later command has cancelled the solve.
+            order.require_valid()  # If it does not count any more, that has cancelled the solve.
             raise
         self._peaks = peaks
         return f"{gait} from the next step on; {source}"
@@ -116,26 +137,37 @@ class WalkCommands:
         self._stream.walk.stay(pace)
         return "stands already, or is about to"
 
+    def give_up(self) -> None:
+        """Let nothing begin any more that was asked for before an emergency stop, except a stop.
+
+        Also a gait that only waits for the end of the step is dropped: nobody who releases an emergency stop
+        expects it any more.
+        """
+        self._end_order("given up because of the emergency stop; release it by ~/resume, then ask again")
+        walk = self._stream.walk
+        if not isinstance(walk.goal, StandProfile):
+            walk.stay(walk.pace)
+
     def _require_no_emergency(self) -> None:
         if self._stream.walk.clock.motion is Motion.EMERGENCY_STOP:
             raise EmergencyStopError("emergency stop; call ~/resume to release it, then ask again")
 
-    def _take_order(self) -> int:
-        """Return the number of a command; those with lower numbers don't count any more."""
+    def _take_order(self) -> _Order:
+        """Return a command that counts from now on, and none else."""
+        self._end_order("a later command came first")
+        self._order = _Order()
+        return self._order
+
+    def _end_order(self, reason: str) -> None:
+        self._order.end(reason)
         self._planner.give_up()
-        self._newest += 1
-        return self._newest
 
-    def _require_newest(self, order: int) -> None:
-        if order != self._newest:
-            raise SupersededError("a later command came first")
-
-    async def _fetch(self, request: GaitRequest, waiting_as: int | None) -> tuple[StreamedGait, str]:
+    async def _fetch(self, request: GaitRequest, waiting_as: _Order | None) -> tuple[StreamedGait, str]:
         """Return a gait of the library, and the sentence that it came with.
 
         Args:
             request: The gait.
-            waiting_as: Number of a command that waits for a library that is not there yet.
+            waiting_as: Command that waits for a library that is not there yet.
 
         Raises:
             WalkOptimizerError: the library refused, or is not there.
@@ -153,16 +185,17 @@ class WalkCommands:
             except ServiceUnavailableError:
                 if waiting_as is None:
                     raise
-            self._require_newest(waiting_as)
+            waiting_as.require_valid()
             self._node.get_logger().warning("waiting for the library", throttle_duration_sec=10.0)
             await self._node.sleep(_RETRY_PERIOD)
         if not answer.success:
             raise GaitNotFoundError(answer.message)
         return StreamedGait.from_message(answer.gait, self._walker), answer.message
 
-    async def _lead_to(self, goal: StreamedGait, order: int) -> None:
+    async def _lead_to(self, goal: StreamedGait, order: _Order) -> None:
         """Have the stream walk to a gait from the pace that it then has."""
         while True:
+            order.require_valid()
             pace = self._stream.pace
             if isinstance(pace, StreamedGait) and pace.message == goal.message:
                 # The same gait again: another copy would only cost a transition to itself.
@@ -170,7 +203,7 @@ class WalkCommands:
                     return
                 continue
             plan = await self._planner.plan(pace, goal, self._torque_limit)
-            self._require_newest(order)
+            order.require_valid()
             self.limits.require(peaks_of(plan.steps))
             if self._stream.follow(plan, goal):
                 return
