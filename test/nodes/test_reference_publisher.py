@@ -244,6 +244,8 @@ def test_a_signal_closes_the_bag_and_leaves_cleanly(graph, publisher, tmp_path, 
         NODE, Parameter("recording_folder", value=str(bag)), Parameter("record", value=True)
     )
     assert all(answer.successful for answer in answers)
+    graph.spin_until(lambda: "recording to" in publisher.output(), "the recording")
+    joints.clear()
     graph.spin_until(lambda: len(joints) > 50, "references")
     assert_left_cleanly(publisher, publisher.stop(number))
     (directory,) = bag.iterdir()
