@@ -29,7 +29,7 @@ class Inbox(Generic[Item]):
 
     @property
     def rejected(self) -> int:
-        """Items that were offered, but found no place."""
+        """Items that were offered to the open queue, but found no place."""
         return self._rejected
 
     @property
@@ -45,10 +45,12 @@ class Inbox(Generic[Item]):
         """Put an item into the queue if it has a place for it.
 
         Returns:
-            Whether the item was taken; one that was not is counted.
+            Whether the item was taken; one that the open queue has no place for is counted.
         """
         with self._lock:
-            if self.closed or len(self._items) >= self._limit:
+            if self.closed:
+                return False
+            if len(self._items) >= self._limit:
                 self._rejected += 1
                 return False
             self._items.append(item)

@@ -141,7 +141,8 @@ class Recorder:
             publish_time_ns: When it was published, in [ns]; `log_time_ns` when None.
 
         Returns:
-            Whether the message was taken; one that was not is counted as dropped.
+            Whether the message was taken; one that was not is counted as dropped, unless the recording has
+            ended.
 
         Raises:
             TopicError: If the topic was not announced.

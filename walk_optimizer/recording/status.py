@@ -16,7 +16,7 @@ class RecorderStatus:
         messages: Messages in the bag, those in the open chunk included.
         stored_messages: Messages that a crash of this process cannot take away.
         queued: Messages that wait for the disk.
-        dropped: Messages that were offered, but are not in the bag and will not be.
+        dropped: Messages that were offered while it was recording, but are not in the bag and will not be.
         size_bytes: Size of the files on the disk in [byte].
         error: Why the recording ended on its own; None if it did not.
     """
