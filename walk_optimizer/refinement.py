@@ -19,6 +19,7 @@ from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints, even_mesh, without_vanished
 from walk_optimizer.transcription.phases import (
     INSTANT_POINTS,
+    Phase,
     phase_shares,
     phases_of,
     with_steady_end,
@@ -32,8 +33,10 @@ FloatArray = NDArray[np.float64]
 _FEWEST_INTERVALS = 3
 _MOST_PHASES = 6
 _ROUNDS = 6
-# Contact phases that the continuous problem does not have never converge; others need far fewer.
+# Single support needs up to 70 iterations from the report's grid. Contact phases that the continuous problem
+# does not have never converge, and take three times as long an iteration.
 _MOST_ITERATIONS = 200
+_MOST_ITERATIONS_OF_OTHER_PHASES = 80
 # Barrier parameter for a start from the report's grid, or from another refined solution.
 BARRIER = 1e-5
 
@@ -109,7 +112,9 @@ def refine(gait: Gait, session: SolveSession) -> RefinedSolution:
 
 def _begun(solves: "RefinedSolves", first: "FirstGuess", mesh: Mesh) -> RefinedSolution:
     """Return the solution on an initial mesh, solved again without phases that shrink to nothing."""
-    solution = solves.solved(mesh, first.points(mesh))
+    alone = mesh.phases == first.single_support
+    limit = _MOST_ITERATIONS if alone else _MOST_ITERATIONS_OF_OTHER_PHASES
+    solution = solves.solved(mesh, first.points(mesh), limit)
     if solution.trajectory is None:
         return solution
     lasting = without_vanished(mesh, solution.trajectory.breaks)
@@ -147,16 +152,19 @@ class RefinedSolves:
             best = self.solved(finer, resampled(trajectory, best.spring, mesh, finer))
         return best
 
-    def solved(self, mesh: Mesh, points: RefinedPoints) -> RefinedSolution:
+    def solved(
+        self, mesh: Mesh, points: RefinedPoints, most_iterations: int = _MOST_ITERATIONS
+    ) -> RefinedSolution:
         """Return the solution on one mesh.
 
         Args:
             mesh: Phases and intervals.
             points: First guess.
+            most_iterations: Iteration limit.
         """
         refined = RefinedProblem(self.request, self.walker, mesh)
         unit = torque_unit(self.walker) ** 2 / self.request.interval
-        options = replace(self.session.options, barrier=BARRIER, maximum_iterations=_MOST_ITERATIONS)
+        options = replace(self.session.options, barrier=BARRIER, maximum_iterations=most_iterations)
         solution = self.session.solve(
             refined.problem(), refined.pack(points), "refinement", objective_unit=unit, options=options
         )
@@ -173,6 +181,11 @@ class FirstGuess:
         """Take a gait on the report's grid."""
         self.gait, self.walker, self.request = gait, gait.walker, gait.request
 
+    @property
+    def single_support(self) -> tuple[Phase, ...]:
+        """The one phase of a step in single support."""
+        return phases_of(single_impact(self.gait.trajectory.points))
+
     def meshes(self) -> list[Mesh]:
         """Return even meshes of the gait's own phases, of those without brief ones, and of single support.
 
@@ -184,8 +197,7 @@ class FirstGuess:
             self.walker, self.request.step_length, trajectory.q, trajectory.p, trajectory.reaction
         )
         steady = (with_steady_end(schedule), without_brief_modes(schedule))
-        schedules = (schedule, *steady, single_impact(trajectory.points))
-        plans = dict.fromkeys(phases_of(one) for one in schedules)
+        plans = dict.fromkeys([*(phases_of(one) for one in (schedule, *steady)), self.single_support])
         return [even_mesh([phases], _FEWEST_INTERVALS) for phases in plans if len(phases) <= _MOST_PHASES]
 
     def points(self, mesh: Mesh) -> RefinedPoints:
