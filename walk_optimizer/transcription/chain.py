@@ -38,12 +38,10 @@ def assemble(stages: Sequence[Stage], ends: Ends, shared_count: int, shared_rows
     graph = _Graph(stages, ends, shared_count, shared_rows)
     x, p = graph.x, graph.p
     sigma, lam = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", graph.row_count)
-    g, f = graph.values()
-    jacobian_g, jacobian, cost, gradient = graph.derivatives()
     names = ["x", "p"]
     return Nlp(
-        expressions={"x": x, "p": p, "f": f, "g": g},
-        jacobian=ca.Function("nlp_jac_g", [x, p], [jacobian_g, jacobian], names, ["g", "jac_g_x"]),
+        expressions={"x": x, "p": p, "f": graph.cost(), "g": graph.value()},
+        jacobian=ca.Function("nlp_jac_g", [x, p], list(graph.jacobian()), names, ["g", "jac_g_x"]),
         hessian=ca.Function(
             "nlp_hess_l",
             [x, p, sigma, lam],
@@ -51,7 +49,7 @@ def assemble(stages: Sequence[Stage], ends: Ends, shared_count: int, shared_rows
             [*names, "lam_f", "lam_g"],
             ["triu_hess_gamma_x_x"],
         ),
-        gradient=ca.Function("nlp_grad_f", [x, p], [cost, gradient], names, ["f", "grad_f_x"]),
+        gradient=ca.Function("nlp_grad_f", [x, p], list(graph.gradient()), names, ["f", "grad_f_x"]),
         stages=graph.stage_order(),
     )
 
@@ -151,30 +149,33 @@ class _Graph:
         linear = ca.mtimes(ca.DM(self.shared_rows), shared)
         return ca.vertcat(every_row[self.kept.tolist()], end[self.states :], linear)
 
-    def values(self) -> tuple[ca.MX, ca.MX]:
-        """Return g and f."""
-        outputs = [group.mapped(self, "value") for group in self.groups]
-        f = sum(ca.sum2(cost) for _, cost in outputs)
-        return self._rows([rows for rows, _ in outputs], self._ends("value")), f
+    def value(self) -> ca.MX:
+        """Return g."""
+        return self._rows([group.mapped(self, "value")[0] for group in self.groups], self._ends("value"))
 
-    def derivatives(self) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
-        """Return g, its Jacobian, f and its gradient."""
+    def cost(self) -> ca.MX:
+        """Return f."""
+        return sum(ca.sum2(group.mapped(self, "cost")[0]) for group in self.groups)
+
+    def jacobian(self) -> tuple[ca.MX, ca.MX]:
+        """Return g and its Jacobian."""
         outputs = [group.mapped(self, "jacobian") for group in self.groups]
         end, end_nonzeros = self._ends("jacobian")
-        g = self._rows([one[0] for one in outputs], end)
+        g = self._rows([rows for rows, _ in outputs], end)
         entries = [
-            (*group.jacobian_places(), ca.vec(one[2]))
-            for group, one in zip(self.groups, outputs, strict=True)
+            (*group.jacobian_places(), ca.vec(nonzeros))
+            for group, (_, nonzeros) in zip(self.groups, outputs, strict=True)
         ]
         entries += [*self._handed_on(), *self._closing(end_nonzeros), *self._last_rows(end_nonzeros)]
-        f = sum(ca.sum2(one[1]) for one in outputs)
-        return g, self._gathered_rows(entries), f, self._gradient([one[3] for one in outputs])
+        return g, self._gathered_rows(entries)
 
-    def _gradient(self, gradients: Sequence[ca.MX]) -> ca.MX:
+    def gradient(self) -> tuple[ca.MX, ca.MX]:
+        """Return f and its gradient."""
+        outputs = [group.mapped(self, "gradient") for group in self.groups]
         columns = np.concatenate([group.columns.ravel(order="F") for group in self.groups])
-        values = ca.vertcat(*(ca.vec(one) for one in gradients))
+        values = ca.vertcat(*(ca.vec(gradient) for _, gradient in outputs))
         gathered = gather(columns, np.zeros_like(columns), values, (self.x.numel(), 1))
-        return ca.densify(gathered)
+        return sum(ca.sum2(cost) for cost, _ in outputs), ca.densify(gathered)
 
     def _handed_on(self) -> list[Entries]:
         """Return the constant derivatives of each stage but the first by the state handed to it."""

@@ -14,9 +14,10 @@ class StageKind:
     """One kind of stage.
 
     Attributes:
-        name: Prefix of its functions: `<name>_value` (w, s, par) -> rows, cost; `<name>_jacobian`
-            adds the nonzeros of d rows and of d cost with respect to (w, s); `<name>_hessian`
-            (w, s, par, sigma, lam) -> nonzeros of the upper triangle for sigma cost + lam' rows;
+        name: Prefix of its functions: `<name>_value` (w, s, par) -> rows; `<name>_jacobian` adds the nonzeros
+            of d rows with respect to (w, s); `<name>_cost` (w, s, par) -> cost; `<name>_gradient` adds its
+            gradient by (w, s); `<name>_hessian` (w, s, par, sigma, lam) -> nonzeros of the upper triangle
+            for sigma cost + lam' rows;
             `<name>_jacobian_pattern` and `<name>_hessian_pattern` have the patterns. par is the
             model's vector and one number of the stage's own.
         functions: These functions.

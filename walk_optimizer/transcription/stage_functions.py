@@ -20,8 +20,10 @@ def stage_functions(name: str, w: ca.SX, s: ca.SX, par: ca.SX, rows: ca.SX, cost
     gradient = ca.densify(ca.gradient(cost, variables))
     hessian = ca.triu(ca.hessian(sigma * cost + ca.dot(lam, rows), variables)[0])
     return [
-        ca.Function(f"{name}_value", inputs, [rows, cost]),
-        ca.Function(f"{name}_jacobian", inputs, [rows, cost, jacobian.nz[:], gradient]),
+        ca.Function(f"{name}_value", inputs, [rows]),
+        ca.Function(f"{name}_jacobian", inputs, [rows, jacobian.nz[:]]),
+        ca.Function(f"{name}_cost", inputs, [cost]),
+        ca.Function(f"{name}_gradient", inputs, [cost, gradient]),
         ca.Function(f"{name}_hessian", [*inputs, sigma, lam], [hessian.nz[:]]),
         ca.Function(f"{name}_jacobian_pattern", inputs, [jacobian]),
         ca.Function(f"{name}_hessian_pattern", [*inputs, sigma, lam], [hessian]),
