@@ -146,6 +146,11 @@ def ours_search(request: GaitRequest, refine: bool = False) -> Score:
     return score_points(times, request, points, gait.spring, report.status.value, report.iterations)
 
 
+def ours_table(requests: list[GaitRequest]) -> list[Score]:
+    """Solve and refine requests one after the other, as a script does."""
+    return [ours_search(request, refine=True) for request in requests]
+
+
 def ours_search_without_cache(request: GaitRequest) -> Score:
     """Solve a request where nothing has been compiled before."""
     with tempfile.TemporaryDirectory() as empty:
