@@ -42,6 +42,7 @@ LAYERS = (
         "joint_limits",
         "phase_clock",
         "walk",
+        "walk_needs",
         "stand",
         "blending",
         "command_watch",

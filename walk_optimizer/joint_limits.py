@@ -48,6 +48,24 @@ def peaks_of(steps: Iterable[StepProfile]) -> JointPeaks:
 
 
 @dataclass(frozen=True)
+class JointNeed:
+    """What something that a walker does needs of its joints.
+
+    Attributes:
+        purpose: What it does, such as "to stand".
+        peaks: The most that this needs.
+    """
+
+    purpose: str
+    peaks: JointPeaks
+
+    @classmethod
+    def of(cls, purpose: str, steps: Iterable[StepProfile]) -> "JointNeed":
+        """Return what steps need."""
+        return cls(purpose, peaks_of(steps))
+
+
+@dataclass(frozen=True)
 class JointLimits:
     """What each joint of `JOINTS` can do; infinite where there is no limit.
 
@@ -59,23 +77,24 @@ class JointLimits:
     torque: tuple[float, ...] = (math.inf,) * len(JOINTS)
     speed: tuple[float, ...] = (math.inf,) * len(JOINTS)
 
-    def require(self, peaks: JointPeaks) -> None:
+    def require(self, need: JointNeed) -> None:
         """Refuse steps that need more.
 
         Raises:
             JointLimitError: names each joint that can't do them, what they need and what is allowed.
         """
+        peaks = need.peaks
         excesses = [
             f"{joint} needs {needed:.4g} {unit}, its limit is {limit:.4g} {unit}"
-            for need, limits, unit in (
+            for peak, limits, unit in (
                 (peaks.torque, self.torque, "N m"),
                 (peaks.speed, self.speed, "rad/s"),
             )
-            for joint, needed, limit in zip(JOINTS, need, limits, strict=True)
+            for joint, needed, limit in zip(JOINTS, peak, limits, strict=True)
             if needed > limit * (1 + _TOLERANCE)
         ]
         if excesses:
-            raise JointLimitError("; ".join(excesses))
+            raise JointLimitError(f"{need.purpose}, {'; '.join(excesses)}")
 
 
 def limits_of(values: Sequence[float]) -> tuple[float, ...]:

@@ -291,6 +291,7 @@ def test_a_bad_parameter_stops_the_start(start):
         ("spring_mode", "rubber"),
         ("library_service", "no name"),
         ("cache_folder", "/proc/nowhere"),
+        ("joint_torque_limits", [0.5]),  # Less than a stand needs.
     ):
         node = start("reference_publisher", **{name: value})
         assert node.process.wait(60) == 1

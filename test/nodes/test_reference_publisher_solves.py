@@ -6,12 +6,15 @@ pytest.importorskip("rclpy")
 
 from nodes.graph import exists, workers_of
 from nodes.walking import MODE, NODE, Walker
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
 from walk_optimizer_interfaces.srv import SetGait
 
 pytestmark = pytest.mark.ros
 
 # Of the packaged table, which has no steps from the one to the other: they take seconds to solve for.
 SLOWEST, FASTEST = 0.20 / 0.85, 0.50 / 0.46
+MEDIUM, FASTER = 0.35 / 0.655, 0.40 / 0.59
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +73,55 @@ def test_a_later_command_ends_the_solve_for_an_earlier_one(graph, walker, publis
     assert (refused.success, refused.message) == (False, "a later command came first")
     # Not one that was let run to its end: its process is gone.
     graph.spin_until(lambda: not any(exists(worker) for worker in workers), "the end of the worker")
+
+
+@pytest.fixture
+def limit(graph):
+    """Sets a limit for all joints, and takes all limits away after the test."""
+    names = ("joint_torque_limits", "joint_speed_limits")
+
+    def limit(name, value):
+        (answer,) = graph.set_parameters(NODE, Parameter(name, value=[value]))
+        return answer
+
+    yield limit
+    for name in names:
+        assert limit(name, 0.0).successful
+
+
+def test_limits_hold_for_the_steps_to_a_gait_and_for_those_that_stop_it(walker, limit):
+    # In rad/s at the most: FASTER 7.9, its stop 10.52; MEDIUM 4.9, its stop 6.6, its start 9.68.
+    assert limit("joint_speed_limits", 10.2).successful
+    answer = walker.set_gait(FASTER)
+    assert not answer.success
+    assert "to stop from 0.6780 m/s, left_knee needs 10.52 rad/s, its limit is 10.2 rad/s" in answer.message
+    assert limit("joint_speed_limits", 9.0).successful
+    answer = walker.set_gait(MEDIUM)
+    assert not answer.success
+    assert "to get to 0.5344 m/s, left_knee needs 9.681 rad/s, its limit is 9 rad/s" in answer.message
+    assert walker.states[-1].state == "standing"
+
+
+def test_limits_are_not_lowered_below_what_is_about_to_be_walked_or_its_stop_needs(graph, walker, limit):
+    # In N m at the most: MEDIUM 3.8, its stop 11.4, its start 24.7.
+    walker.trigger("pause")
+    assert walker.set_gait(MEDIUM).success
+    refused = limit("joint_torque_limits", 15.0)
+    assert not refused.successful
+    assert "to get to 0.5344 m/s, left_knee needs 24.69 N m, its limit is 15 N m" in refused.reason
+    walker.trigger("resume")
+    walker.wait_for("walking", MEDIUM)
+    refused = limit("joint_torque_limits", 10.0)
+    assert not refused.successful
+    assert "to stop from 0.5344 m/s, left_knee needs 11.44 N m, its limit is 10 N m" in refused.reason
+    assert limit("joint_torque_limits", 15.0).successful
+
+
+def test_steps_are_solved_for_again_where_the_known_ones_need_too_much(walker, limit):
+    # The packaged steps to a stand need 10.69 N m.
+    joints = walker.listen(JointState, "joint_reference")
+    assert limit("joint_torque_limits", 10.4).successful
+    walker.walk(SLOWEST)
+    walker.trigger("stop")
+    walker.wait_for("standing")
+    assert max(abs(effort) for message in joints for effort in message.effort) <= 10.4

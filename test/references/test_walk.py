@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from references.paces import FAST, SLOW, STAND, STANDING, landing_jump
 
 from walk_optimizer.blending import blended
-from walk_optimizer.joint_limits import JointLimits, peaks_of
+from walk_optimizer.joint_limits import JointLimitError, JointLimits, JointNeed, peaks_of
 from walk_optimizer.phase_clock import PhaseClock
 from walk_optimizer.references import cycle_reference
 from walk_optimizer.walk import DiscontinuousPlanError, StepPlan, Walk
@@ -173,10 +173,12 @@ def test_steps_that_jump_are_no_plan():
 def test_what_no_joint_can_do_is_refused_with_the_joint_and_both_numbers():
     peaks = peaks_of([FAST])
     limits = JointLimits(torque=(100.0, 100.0, 100.0, 1.0), speed=(100.0,) * 4)
-    with pytest.raises(Exception, match=r"right_knee needs \d+(\.\d+)? N m, its limit is 1 N m") as error:
-        limits.require(peaks)
+    need = JointNeed("to walk", peaks)
+    expected = r"to walk, right_knee needs \d+(\.\d+)? N m, its limit is 1 N m"
+    with pytest.raises(JointLimitError, match=expected) as error:
+        limits.require(need)
     assert "left" not in str(error.value)
-    JointLimits().require(peaks)
+    JointLimits().require(need)
     # The legs exchange their roles, so either knee needs what the stance or the swing knee does.
     assert peaks.torque[:2] == peaks.torque[2:]
     assert peaks.speed[1] == pytest.approx(

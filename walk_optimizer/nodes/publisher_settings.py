@@ -88,14 +88,14 @@ SETTINGS = [
         "joint_torque_limits",
         [0.0],
         "Largest torque of each joint, left_hip, left_knee, right_hip, right_knee, or one number for all; "
-        "0 for none. A gait that needs more is refused [N m].",
+        "0 for none. A gait that needs more, or the steps to it or from it to a stand, is refused [N m].",
         check=limits_of,
     ),
     Setting(
         "joint_speed_limits",
         [0.0],
         "Largest speed of each joint, in the same order, or one number for all; 0 for none. A gait that "
-        "needs more is refused [rad/s].",
+        "needs more, or the steps to it or from it to a stand, is refused [rad/s].",
         check=limits_of,
     ),
     Setting("longest_gap", 0.1, "A clock that moves further than this at once has jumped [s].", 0.002, 10.0),

@@ -11,7 +11,8 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 from walk_optimizer_interfaces.srv import GetGait, GetJointTrajectory, SetGait
 
-from walk_optimizer.errors import GaitNotFoundError, WalkOptimizerError
+from walk_optimizer.errors import ConfigurationError, GaitNotFoundError, WalkOptimizerError
+from walk_optimizer.joint_limits import JointLimitError
 from walk_optimizer.nodes.bag import StreamBag
 from walk_optimizer.nodes.cycle_message import cycle_to_message
 from walk_optimizer.nodes.joint_stream import JointStream
@@ -71,8 +72,17 @@ class ReferencePublisherNode(ManagedNode):
             self.serve(Trigger, f"~/{name}", getattr(self, f"_{name}"))
 
     def activate(self) -> None:
-        """Stream a stand, and do what the parameters ask for from the start."""
-        self._stream.start(self._commands.begin(), self.parameters["rate"])
+        """Stream a stand, and do what the parameters ask for from the start.
+
+        Raises:
+            ConfigurationError: parameters don't fit each other, or the walker.
+        """
+        self._commands.limits = joint_limits(self.parameters)
+        try:
+            stand = self._commands.begin()
+        except JointLimitError as error:
+            raise ConfigurationError(f"{' or '.join(sorted(LIMIT_SETTINGS))} too low: {error}") from error
+        self._stream.start(stand, self.parameters["rate"])
         self._put_into_effect({setting.name for setting in SETTINGS})
         if self.parameters["initial_speed"] != 0:
             self.later(self._walk_from_the_start)

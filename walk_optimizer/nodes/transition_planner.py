@@ -11,6 +11,7 @@ from walk_optimizer.blending import blended
 from walk_optimizer.errors import InvalidRequestError, SolveFailedError, WalkOptimizerError
 from walk_optimizer.gait import RefinedGait
 from walk_optimizer.gait_files.access import writable_folder
+from walk_optimizer.joint_limits import peaks_of
 from walk_optimizer.model.parameters import KneeSpring
 from walk_optimizer.nodes.publisher_settings import BLENDED
 from walk_optimizer.nodes.streamed_gait import Goal, pace_of_goal, profile_of_goal
@@ -27,6 +28,9 @@ from walk_optimizer.walk import StepPlan
 # Transitions that are kept in memory; they take about 100 kB each.
 _KEPT = 64
 _WORKERS = 1
+# A solve bounds the torques at its nodes. Between them, the polynomials of the packaged transitions are up to
+# a tenth higher, where a step begins.
+_OVERSHOOT = 0.1
 # Names, knee springs and states of both ends.
 _Ends: TypeAlias = tuple[tuple[str, KneeSpring, bytes], ...]
 
@@ -127,7 +131,7 @@ class TransitionPlanner:
         job = TransitionJob(
             source=source,
             target=target,
-            torque_limit=torque_limit,
+            torque_limit=torque_limit * (1 - _OVERSHOOT),
             time_limit=limit,
             folder=Path(folder) if folder else None,
         )
@@ -156,8 +160,8 @@ def _ends(begins: Goal, leads_to: Goal) -> _Ends:
 
 
 def _peak_torque(steps: tuple[RefinedGait, ...]) -> float:
-    """Return the largest torque of steps in [N m]."""
-    return max(float(np.abs(step.trajectory.torques).max()) for step in steps)
+    """Return the largest torque of steps in [N m], between their nodes too."""
+    return max(peaks_of(RefinedProfile.of(step) for step in steps).torque)
 
 
 def _paces(begins: Goal, leads_to: Goal) -> tuple[Pace, Pace]:

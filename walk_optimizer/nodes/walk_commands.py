@@ -3,7 +3,7 @@
 from walk_optimizer_interfaces.srv import GetGait
 
 from walk_optimizer.errors import GaitNotFoundError, WalkOptimizerError
-from walk_optimizer.joint_limits import JointLimits, peaks_of
+from walk_optimizer.joint_limits import JointLimits, JointNeed
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.lifecycle import ManagedNode
@@ -12,13 +12,16 @@ from walk_optimizer.nodes.streamed_gait import StreamedGait
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
 from walk_optimizer.nodes.transition_planner import NoTransitionError, TransitionPlanner
 from walk_optimizer.phase_clock import Motion
+from walk_optimizer.profile import StepProfile
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.stand import StandProfile
 from walk_optimizer.transition.settings import transition_settings
 from walk_optimizer.transition.standing import standing_pose
+from walk_optimizer.walk_needs import PaceNeeds, WalkNeeds
 
 # Before the library is up, it is tried again after this time in [s].
 _RETRY_PERIOD = 1.0
+_TO_STAND = "to stand"
 
 
 class SupersededError(WalkOptimizerError):
@@ -82,23 +85,28 @@ class WalkCommands:
         self._order = _Order()
 
     def begin(self) -> StandProfile:
-        """Return what the stream begins with."""
+        """Return what the stream begins with.
+
+        Raises:
+            JointLimitError: the joints can't even stand.
+        """
         stand = StandProfile(self._standing)
-        self._peaks = peaks_of([stand])
+        standing = self._needed(_TO_STAND, stand)
+        self._needs = WalkNeeds(stand, PaceNeeds((standing,)))
         return stand
 
     def require_met(self, limits: JointLimits) -> None:
-        """Refuse limits that what is walked now does not meet.
+        """Refuse limits that what is walked now, what is about to be, or its stop does not meet.
 
         Raises:
-            JointLimitError: names the joint and both numbers.
+            JointLimitError: says what for, names the joint and both numbers.
         """
-        limits.require(self._peaks)
+        self._needs.require(limits, self._stream.walk)
 
     async def walk_at(self, request: GaitRequest, wait_for_library: bool = False) -> str:
         """Have a gait walked, and return a sentence about it.
 
-        Nothing is begun that could not be stopped: the steps to a stand are planned before.
+        Nothing is begun that could not be stopped within the limits: the steps to a stand are planned before.
 
         Args:
             request: The gait.
@@ -112,15 +120,15 @@ class WalkCommands:
         order = self._take_order()
         gait, source = await self._fetch(request, order if wait_for_library else None)
         order.require_valid()
-        peaks = peaks_of([gait.profile])
-        self.limits.require(peaks)
+        keeping = self._needed(f"to walk at {gait.speed:.4f} m/s", gait.profile)
+        stand = self._stand_after(gait)
         try:
-            await self._planner.plan(gait, self._stand_after(gait), self._torque_limit)
-            await self._lead_to(gait, order)
+            stop = await self._planner.plan(gait, stand, self._torque_limit)
+            stopping = self._needed(f"to stop from {gait.speed:.4f} m/s", *stop.steps, stand)
+            await self._lead_to(gait, order, (keeping, stopping))
         except NoTransitionError:
             order.require_valid()  # If it does not count any more, that has cancelled the solve.
             raise
-        self._peaks = peaks
         return f"{gait} from the next step on; {source}"
 
     def stop(self) -> str:
@@ -131,7 +139,9 @@ class WalkCommands:
             stand = self._stand_after(pace)
             plan = self._planner.plan_at_once(pace, stand)
             if self._stream.follow(plan, stand):
-                self._peaks = peaks_of([stand])
+                # Whatever they need: a stop is always possible.
+                needs = PaceNeeds((JointNeed.of(_TO_STAND, [stand]),), JointNeed.of("to stop", plan.steps))
+                self._needs.add(self._stream.walk, stand, needs)
                 return "comes to a stand after the running step"
             pace = self._stream.pace
         self._stream.walk.stay(pace)
@@ -192,8 +202,8 @@ class WalkCommands:
             raise GaitNotFoundError(answer.message)
         return StreamedGait.from_message(answer.gait, self._walker), answer.message
 
-    async def _lead_to(self, goal: StreamedGait, order: _Order) -> None:
-        """Have the stream walk to a gait from the pace that it then has."""
+    async def _lead_to(self, goal: StreamedGait, order: _Order, staying: tuple[JointNeed, ...]) -> None:
+        """Have the stream walk to a gait, which needs something itself, from the pace that it then has."""
         while True:
             order.require_valid()
             pace = self._stream.pace
@@ -204,9 +214,20 @@ class WalkCommands:
                 continue
             plan = await self._planner.plan(pace, goal, self._torque_limit)
             order.require_valid()
-            self.limits.require(peaks_of(plan.steps))
+            leading = self._needed(f"to get to {goal.speed:.4f} m/s", *plan.steps)
             if self._stream.follow(plan, goal):
+                self._needs.add(self._stream.walk, goal.profile, PaceNeeds(staying, leading))
                 return
+
+    def _needed(self, purpose: str, *steps: StepProfile) -> JointNeed:
+        """Return what steps need of the joints.
+
+        Raises:
+            JointLimitError: the joints can't do them.
+        """
+        need = JointNeed.of(purpose, steps)
+        self.limits.require(need)
+        return need
 
     def _stand_after(self, gait: StreamedGait) -> StandProfile:
         """Return the stand that a gait is stopped in: its knee springs stay as they are."""
