@@ -1,5 +1,6 @@
 """Recording beside everything else: the disk may take its time, the node answers meanwhile."""
 
+import errno
 import os
 import threading
 
@@ -7,7 +8,9 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nodes.walking import NODE
+from rcl_interfaces.msg import Log
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
@@ -20,6 +23,8 @@ from walk_optimizer.recording import describe_bag
 
 pytestmark = pytest.mark.ros
 
+# Of rcl_interfaces/msg/Log.
+ERROR = 40
 START, STOP = f"{NODE}/start_recording", f"{NODE}/stop_recording"
 
 
@@ -50,6 +55,20 @@ def disk(monkeypatch):
     disk = SlowDisk(monkeypatch)
     yield disk
     disk.release()
+
+
+class FullDisk:
+    """A disk that takes nothing while it is full."""
+
+    def __init__(self, monkeypatch):
+        self.full = False
+        self._write = os.write
+        monkeypatch.setattr(os, "write", self._refuse)
+
+    def _refuse(self, descriptor, data):
+        if self.full:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return self._write(descriptor, data)
 
 
 class Running:
@@ -138,3 +157,58 @@ def test_a_node_that_ends_while_a_bag_is_being_begun_leaves_a_whole_one(graph, d
     publisher.close()
     assert "is shutting down" in graph.result(answer).message
     assert describe_bag(tmp_path / "bag").is_whole
+
+
+def record(graph, folder):
+    """Ask for a bag in a folder, as an operator does."""
+    parameters = (Parameter("recording_folder", value=str(folder)), Parameter("record", value=True))
+    assert all(answer.successful for answer in graph.set_parameters(NODE, *parameters))
+
+
+def wait_for(graph, heard, level, words):
+    """Wait until the newest finding about the recording has words, and `record` tells the same."""
+    heard.clear()
+
+    def told():
+        statuses = [one for array in heard for one in array.status if one.name == f"{NODE}: recording"]
+        return statuses and words in statuses[-1].message and statuses[-1].level == level
+
+    graph.spin_until(told, words, 30.0)
+    recording = words.startswith("recording to")
+    graph.spin_until(
+        lambda: graph.get_parameter(NODE, "record").bool_value == recording, "the parameter `record`", 30.0
+    )
+
+
+def test_a_bag_that_can_not_be_begun_is_told_and_not_claimed(graph, publisher, tmp_path):
+    heard = graph.subscribe(DiagnosticArray, "/diagnostics")
+    for place in ("/dev/null/bags", "~nobody_of_that_name/bags", "/tmp/" + 300 * "n"):
+        record(graph, place)
+        wait_for(graph, heard, DiagnosticStatus.ERROR, f"not recording: Cannot write {place}")
+    record(graph, tmp_path)
+    wait_for(graph, heard, DiagnosticStatus.OK, f"recording to {tmp_path}")
+    assert graph.call(StopRecording, STOP).success
+    wait_for(graph, heard, DiagnosticStatus.OK, "not recording")
+    record(graph, place)
+    wait_for(graph, heard, DiagnosticStatus.ERROR, "not recording: Cannot write")
+    graph.set_parameters(NODE, Parameter("record", value=False))
+    wait_for(graph, heard, DiagnosticStatus.OK, "not recording")
+
+
+def test_after_a_full_disk_another_folder_is_recorded_to(graph, publisher, tmp_path, monkeypatch):
+    heard = graph.subscribe(DiagnosticArray, "/diagnostics")
+    told = graph.subscribe(Log, "/rosout")
+    disk = FullDisk(monkeypatch)
+    record(graph, tmp_path / "full")
+    wait_for(graph, heard, DiagnosticStatus.OK, "recording to")
+    disk.full = True
+    wait_for(graph, heard, DiagnosticStatus.ERROR, "recording has ended: Cannot write")
+    disk.full = False
+    errors = [one for one in told if one.level == ERROR]
+    (error,) = errors
+    assert (error.name, "No space left on device; free space" in error.msg) == (NODE, True)
+    record(graph, tmp_path / "other")
+    wait_for(graph, heard, DiagnosticStatus.OK, f"recording to {tmp_path / 'other'}")
+    assert graph.call(StopRecording, STOP).success
+    (bag,) = (tmp_path / "other").iterdir()
+    assert describe_bag(bag).is_whole

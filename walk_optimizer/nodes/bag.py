@@ -11,7 +11,13 @@ from rclpy.qos import QoSProfile
 from walk_optimizer.nodes.qos_warnings import warn_of_subscribers
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.recording import Recorder, RecorderSettings, TopicInfo
-from walk_optimizer.recording.errors import AlreadyRecordingError, NotRecordingError
+from walk_optimizer.recording.errors import (
+    AlreadyRecordingError,
+    BagNotWritableError,
+    NotRecordingError,
+    RecordingError,
+)
+from walk_optimizer.recording.recorder import RecorderLog
 from walk_optimizer.recording.ros_messages import serialize, topic_info
 from walk_optimizer.recording.status import RecorderStatus
 
@@ -23,8 +29,20 @@ def new_bag_folder(folder: str) -> Path:
         folder: Where bags go; empty for `$ROS_HOME/walk_optimizer`, by default below `~/.ros`.
     """
     home = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros")
-    base = Path(folder).expanduser() if folder else home / "walk_optimizer"
+    base = named_folder(folder) if folder else home / "walk_optimizer"
     return base / f"walk_{datetime.now().astimezone():%Y_%m_%d-%H_%M_%S_%f}"
+
+
+def named_folder(name: str) -> Path:
+    """Return a folder that a user has named; `~` is a home.
+
+    Raises:
+        BagNotWritableError: there is no such home.
+    """
+    try:
+        return Path(name).expanduser().absolute()
+    except RuntimeError as error:
+        raise BagNotWritableError(f"Cannot write {name}: no such home; name another folder") from error
 
 
 class RecordedTopic:
@@ -61,28 +79,44 @@ class StreamBag:
 
     Attributes:
         topics: What is recorded.
-        recorder: The running recording; None when there is none.
+        recorder: The recording, also one that has ended by itself; None when there is none.
+        error: Why the last bag could not be begun; None when it could.
     """
 
     def __init__(self) -> None:
         """Record nothing."""
         self.topics: list[RecordedTopic] = []
         self.recorder: Recorder | None = None
+        self.error: RecordingError | None = None
 
-    def start(self, directory: Path, settings: RecorderSettings) -> Recorder:
+    @property
+    def recording(self) -> bool:
+        """Whether a bag is being recorded."""
+        return self.recorder is not None and self.recorder.status().recording
+
+    def start(self, directory: Path, settings: RecorderSettings, log: RecorderLog) -> Recorder:
         """Begin a bag and return its recorder.
+
+        Args:
+            directory: The bag.
+            settings: How it is written.
+            log: Gets what goes wrong later.
 
         Raises:
             AlreadyRecordingError: one is being recorded.
             RecordingError: the bag can't be created.
         """
-        if self.recorder is not None and self.recorder.status().recording:
-            raise AlreadyRecordingError(f"already recording to {self.recorder.directory}; stop that first")
-        recorder = Recorder(directory, settings)
+        if self.recorder is not None:
+            if self.recording:
+                raise AlreadyRecordingError(
+                    f"already recording to {self.recorder.directory}; stop that first"
+                )
+            self.stop()
+        recorder = Recorder(directory, settings, log=log)
         for topic in self.topics:
             recorder.add_topic(topic.info)
         recorder.start()
-        self.recorder = recorder
+        self.recorder, self.error = recorder, None
         return recorder
 
     def rest(self) -> None:
@@ -96,7 +130,7 @@ class StreamBag:
         Raises:
             NotRecordingError: nothing is being recorded.
         """
-        recorder, self.recorder = self.recorder, None
+        recorder, self.recorder, self.error = self.recorder, None, None
         if recorder is None:
             raise NotRecordingError("nothing is being recorded")
         return recorder.stop()

@@ -71,6 +71,8 @@ class PublisherHealth:
     def _recording(self) -> Finding:
         recorder = self._bag.recorder
         if recorder is None:
+            if self._bag.error is not None:
+                return Finding(Level.ERROR, f"not recording: {self._bag.error}")
             return Finding(Level.OK, "not recording")
         status = recorder.status()
         values = _recording_values(status)

@@ -9,23 +9,43 @@ from typing import TypeVar
 from rclpy.parameter import Parameter
 from walk_optimizer_interfaces.srv import StartRecording, StopRecording
 
-from walk_optimizer.errors import WalkOptimizerError
-from walk_optimizer.nodes.bag import StreamBag, new_bag_folder
+from walk_optimizer.nodes.bag import StreamBag, named_folder, new_bag_folder
 from walk_optimizer.nodes.foreign_topics import ForeignTopics
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.lifecycle import ManagedNode, NotActiveError
 from walk_optimizer.nodes.publisher_settings import recorder_settings
-from walk_optimizer.recording.errors import AlreadyRecordingError, NotRecordingError
+from walk_optimizer.recording.errors import AlreadyRecordingError, NotRecordingError, RecordingError
 from walk_optimizer.recording.status import RecorderStatus
 
 _Result = TypeVar("_Result")
+
+
+class _NodeLog:
+    """Tells by a node's log what goes wrong with a recording; from the recorder's thread."""
+
+    def __init__(self, node: ManagedNode, ended: Callable[[], None]) -> None:
+        """Tell nothing yet.
+
+        Args:
+            node: Whose log it is.
+            ended: Called by its executor when a recording has ended by itself.
+        """
+        self._node, self._ended = node, ended
+
+    def warning(self, message: str) -> None:
+        self._node.get_logger().warning(message)
+
+    def error(self, message: str) -> None:
+        self._node.get_logger().error(f"{message}; then set `record` again")
+        self._node.later(self._ended)
 
 
 class RecordingControl:
     """Starts and stops bags, one after the other. Does not own what is in them (`bag`).
 
     Owns the thread that waits for the disk meanwhile: the executor never does, for it also has to carry out
-    an emergency stop.
+    an emergency stop. The parameter tells what is: it goes back to false when a bag can't be begun or ends by
+    itself.
     """
 
     def __init__(self, node: ManagedNode, bag: StreamBag, stream: JointStream) -> None:
@@ -40,6 +60,7 @@ class RecordingControl:
         self._foreign: ForeignTopics | None = None
         self._showing = False
         self._thread = ThreadPoolExecutor(1, "bags")
+        self._log = _NodeLog(node, self._show)
         node.serve(StartRecording, "~/start_recording", self._start)
         node.serve(StopRecording, "~/stop_recording", self._stop)
 
@@ -61,16 +82,12 @@ class RecordingControl:
         self._thread.shutdown()
 
     async def _start(self, request: StartRecording.Request, response: StartRecording.Response) -> None:
-        directory = await self._record(
-            Path(request.directory).expanduser().absolute() if request.directory else None
-        )
-        self._show(True)
+        directory = await self._record(named_folder(request.directory) if request.directory else None)
         response.directory = str(directory)
         response.message = f"recording to {directory}"
 
     async def _stop(self, _request: StopRecording.Request, response: StopRecording.Response) -> None:
         status = await self._end()
-        self._show(False)
         response.directory, response.messages = str(status.directory), status.messages
         if status.error is not None:
             raise status.error
@@ -83,16 +100,19 @@ class RecordingControl:
             await (self._record() if wanted else self._end())
         except (AlreadyRecordingError, NotRecordingError, NotActiveError):
             return  # It is as the parameter says, or will be with the next activation.
-        except WalkOptimizerError as error:
-            self._node.get_logger().error(f"record: {error}")
+        except RecordingError as error:
+            self._node.get_logger().error(f"not recording: {error}")
+            self._bag.error = error
+            self._show()
 
     async def _record(self, directory: Path | None = None) -> Path:
         """Begin a bag and return its directory."""
         parameters = self._node.parameters
         directory = directory or new_bag_folder(parameters["recording_folder"])
         settings = recorder_settings(parameters)
-        await self._done(lambda: self._bag.start(directory, settings))
+        await self._done(lambda: self._bag.start(directory, settings, self._log))
         self._listen_to_others()
+        self._show()
         self._stream.announce_again()
         self._node.get_logger().info(f"recording to {directory}")
         return directory
@@ -101,6 +121,7 @@ class RecordingControl:
         """Close the bag and return what is in it."""
         status = await self._done(self._bag.stop)
         self._listen_to_others()
+        self._show()
         self._tell_closed(status)
         return status
 
@@ -122,8 +143,9 @@ class RecordingControl:
     def _tell_closed(self, status: RecorderStatus) -> None:
         self._node.get_logger().info(f"closed {status.directory} with {status.messages} messages")
 
-    def _show(self, running: bool) -> None:
-        """Make the parameter `record` say what a service did."""
+    def _show(self) -> None:
+        """Make the parameter `record` say what is."""
+        running = self._bag.recording
         if self._node.parameters["record"] == running:
             return
         self._showing = True

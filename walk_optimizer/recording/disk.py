@@ -13,6 +13,10 @@ from walk_optimizer.resources import sync_directory
 _FULL_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 
 
+MAKE_SPACE = "free space, or record to another disk"
+"""What helps against a full disk."""
+
+
 class RecordFile:
     """A file that is only appended to, and that holds no half-written record.
 
@@ -105,5 +109,5 @@ def write_error(path: Path, error: OSError) -> RecordingError:
     """Return the recording error that says what an operating system error means for a bag."""
     reason = error.strerror or str(error)
     if error.errno in _FULL_ERRNOS:
-        return DiskFullError(f"Cannot write {path}: {reason}")
-    return BagNotWritableError(f"Cannot write {path}: {reason}")
+        return DiskFullError(f"Cannot write {path}: {reason}; {MAKE_SPACE}")
+    return BagNotWritableError(f"Cannot write {path}: {reason}; name a folder that can be written")

@@ -8,9 +8,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
+from typing import Protocol
 
 from walk_optimizer.recording.bag_writer import BagWriter
-from walk_optimizer.recording.disk import free_bytes, nearest_directory
+from walk_optimizer.recording.disk import MAKE_SPACE, free_bytes, nearest_directory, write_error
 from walk_optimizer.recording.errors import DiskFullError, RecordingError
 from walk_optimizer.recording.inbox import Inbox
 from walk_optimizer.recording.settings import RecorderSettings
@@ -24,7 +25,15 @@ DROPPED_KEY = "dropped_messages"
 # those who write.
 _GATHERING, _PATIENCE = 0.005, 0.02
 
-_logger = logging.getLogger(__name__)
+
+class RecorderLog(Protocol):
+    """Takes what an operator has to know, from any thread; Python's loggers do."""
+
+    def warning(self, message: str, /) -> object:
+        """Tell of messages that the bag lacks."""
+
+    def error(self, message: str, /) -> object:
+        """Tell why the recording has ended by itself."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +72,7 @@ class Recorder:
         settings: RecorderSettings | None = None,
         custom_data: Mapping[str, str] | None = None,
         free_space: Callable[[Path], int] = free_bytes,
+        log: RecorderLog | None = None,
     ) -> None:
         """Prepare a recording; nothing is written before `start`.
 
@@ -71,11 +81,13 @@ class Recorder:
             settings: How to write it.
             custom_data: Free texts for metadata.yaml.
             free_space: Returns the free space at a place in [byte].
+            log: Gets what goes wrong; Python's logging when None.
         """
         self.directory = directory
         self.settings = settings or RecorderSettings()
         self._custom_data = dict(custom_data or {})
         self._free_space = free_space
+        self._log: RecorderLog = log or logging.getLogger(__name__)
         self._topics: dict[str, TopicInfo] = {}
         self._inbox: Inbox[_Entry | TopicInfo] = Inbox(self.settings.queue_messages)
         self._thread: threading.Thread | None = None
@@ -123,7 +135,10 @@ class Recorder:
         """
         if self._thread is not None:
             raise RecordingError(f"The recorder of {self.directory} was started before")
-        self._require_space(nearest_directory(self.directory))
+        try:
+            self._require_space(nearest_directory(self.directory))
+        except OSError as error:
+            raise write_error(self.directory, error) from error
         topics = tuple(self._topics.values())
         writer = BagWriter(self.directory, self.settings, self._custom_data, topics)
         # A daemon, so that a program that forgets to stop can end; the exit hook closes its bag.
@@ -227,17 +242,16 @@ class Recorder:
         if free < least:
             raise DiskFullError(
                 f"Not recording to {self.directory} any more: {free / 1e6:.1f} MB are free on the"
-                f" disk, and {least / 1e6:.1f} MB must stay free"
+                f" disk, and {least / 1e6:.1f} MB must stay free; {MAKE_SPACE}"
             )
 
     def _report_dropped(self) -> None:
         dropped = self._inbox.rejected - self._reported
         if dropped:
-            _logger.warning(
-                "%s: %d messages dropped, the queue of %d was full",
-                self.directory,
-                dropped,
-                self.settings.queue_messages,
+            limit = self.settings.queue_messages
+            self._log.warning(
+                f"{self.directory}: {dropped} messages dropped, the queue of {limit} was full: the disk is "
+                "too slow; record fewer topics, or to a faster disk"
             )
         self._reported += dropped
 
@@ -254,7 +268,7 @@ class Recorder:
             self._error = self._error or error
         self._note_progress(writer, lost=self._taken - writer.messages)
         if self._error is not None:
-            _logger.error("%s", self._error)
+            self._log.error(f"the recording has ended: {self._error}")
 
     def _note_progress(self, writer: BagWriter, lost: int = 0) -> None:
         self._progress = _Progress(writer.messages, writer.stored_messages, writer.size, lost)
