@@ -4,7 +4,6 @@ The motion between impacts is integrated as an ordinary differential equation of
 the ground reactions that hold the feet under load solved for at every instant.
 """
 
-from collections.abc import Callable
 from functools import cache
 
 import casadi as ca
@@ -30,8 +29,8 @@ _ANY_TREAD = 1.0
 HELD_SPEED = 1e-6
 
 
-def _rate_function(modes: Modes) -> ca.Function:
-    """Return (state, u, spring, walker) -> rate of the state (12,) with the feet that carry load held.
+def _rate_functions(modes: Modes) -> list[ca.Function]:
+    """Return `rate`: (state, u, spring, walker) -> rate of the state (12,), feet that carry load being held.
 
     With qdot = M^-1 p, holding a foot means d/dt (J qdot) = 0 of the velocities that are held, both of
     a foot that sticks and the normal one of a foot that slips. With pdot = f + D lambda,
@@ -56,7 +55,7 @@ def _rate_function(modes: Modes) -> ca.Function:
     inner = ca.Function("inner", [q, v, u, spring, walker.symbols], [rate])
     velocity = dynamics.velocity(walker, q, p)
     complete = ca.vertcat(velocity, inner(q, velocity, u, spring, walker.symbols))
-    return ca.Function("rate", [ca.vertcat(q, p), u, spring, walker.symbols], [complete])
+    return [ca.Function("rate", [ca.vertcat(q, p), u, spring, walker.symbols], [complete])]
 
 
 def _held(walker: SymbolicWalker, q: ca.SX, leg: int, mode: FootMode) -> tuple[ca.SX, ca.SX]:
@@ -70,14 +69,9 @@ def _held(walker: SymbolicWalker, q: ca.SX, leg: int, mode: FootMode) -> tuple[c
 
 
 @cache
-def _builder(modes: Modes) -> Callable[[], list[ca.Function]]:
-    return lambda: [_rate_function(modes)]
-
-
-@cache
 def _rates(modes: Modes, count: int) -> ca.Function:
-    """Return `_rate_function`, compiled, for as many states at once, in columns."""
-    return compiled(_builder(modes))["rate"].map(count)
+    """Return `rate`, compiled, for as many states at once, in columns."""
+    return compiled(_rate_functions, modes)["rate"].map(count)
 
 
 def _replayed(

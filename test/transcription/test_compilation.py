@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from walk_optimizer.compiler import COMPILER_VARIABLE, cache_folder
+from walk_optimizer.transcription import compilation
 from walk_optimizer.transcription.boundary import periodic_functions
 from walk_optimizer.transcription.compilation import compiled
 from walk_optimizer.transcription.euler_stage import euler_functions
@@ -81,7 +82,54 @@ def test_what_was_compiled_is_used_the_second_time(compiler):
     assert is_compiled(second)
     assert_works(second)
     assert runs() == 1
-    assert [path.suffix for path in cache_folder().iterdir()] == [".so"], "no scratch is left behind"
+    assert sorted(path.suffix for path in cache_folder().iterdir()) == [".json", ".so"], "no scratch is left"
+
+
+def power(exponent):
+    builds.append(exponent)
+    x = ca.SX.sym("x")
+    return [ca.Function("power", [x], [x**exponent])]
+
+
+builds = []
+
+
+@needs_compiler
+def test_a_second_process_need_not_build_the_expressions():
+    builds.clear()
+    for _ in range(2):
+        assert float(compiled_anew(power, 2)["power"](3.0)) == 9.0
+        assert float(compiled_anew(power, 3)["power"](3.0)) == 27.0
+    assert builds == [2, 3]
+
+
+@needs_compiler
+@pytest.mark.parametrize("damage", ["{", "[]", '{"library": "none.so", "functions": ["power"]}', "\0"])
+def test_a_damaged_note_is_written_anew(damage):
+    compiled_anew(power, 2)
+    (note,) = cache_folder().glob("*.json")
+    whole = note.read_text()
+    note.write_text(damage)
+    functions = compiled_anew(power, 2)
+    assert is_compiled(functions)
+    assert float(functions["power"](3.0)) == 9.0
+    assert note.read_text() == whole
+    assert len(libraries()) == 1
+
+
+@needs_compiler
+def test_other_sources_are_built_anew(tmp_path, monkeypatch):
+    builds.clear()
+    compiled_anew(power, 2)
+    source = tmp_path / "dynamics.py"
+    source.write_text("before")
+    monkeypatch.setattr(compilation, "_SOURCES", (tmp_path,))
+    compiled_anew(power, 2)
+    source.write_text("after")
+    compiled_anew(power, 2)
+    compiled_anew(power, 2)
+    assert builds == [2, 2, 2]
+    assert len(libraries()) == 1, "what they compute did not change"
 
 
 @needs_compiler

@@ -17,13 +17,7 @@ _ANY_TREAD = 1.0
 
 
 @cache
-def model_function(name: str) -> ca.Function:
-    """Return one quantity of the model as a CasADi function of q, p, the walker's vector and (K, q_eq).
-
-    Args:
-        name: `mass_matrix` (6, 6), `velocity` (6,), `force` -dH/dq (6,), `feet` (2, 2) columns are
-            feet, `foot_velocities` (2, 2), `energy` the Hamiltonian.
-    """
+def _model_functions() -> dict[str, ca.Function]:
     walker = SymbolicWalker()
     q, p, spring = ca.SX.sym("q", 6), ca.SX.sym("p", 6), ca.SX.sym("spring", 2)
     qdot = dynamics.velocity(walker, q, p)
@@ -36,7 +30,18 @@ def model_function(name: str) -> ca.Function:
         "foot_velocities": ca.horzcat(*(ca.jacobian(foot, q) @ qdot for foot in feet)),
         "energy": dynamics.kinetic_energy(walker, q, qdot) + dynamics.potential_energy(walker, q, spring),
     }
-    return ca.Function(name, [q, p, walker.symbols, spring], [quantities[name]])
+    inputs = [q, p, walker.symbols, spring]
+    return {name: ca.Function(name, inputs, [value]) for name, value in quantities.items()}
+
+
+def model_function(name: str) -> ca.Function:
+    """Return one quantity of the model as a CasADi function of q, p, the walker's vector and (K, q_eq).
+
+    Args:
+        name: `mass_matrix` (6, 6), `velocity` (6,), `force` -dH/dq (6,), `feet` (2, 2) columns are
+            feet, `foot_velocities` (2, 2), `energy` the Hamiltonian.
+    """
+    return _model_functions()[name]
 
 
 def evaluate(

@@ -49,8 +49,8 @@ def end_functions(name: str, z: ca.SX, par: ca.SX, rows: ca.SX) -> list[ca.Funct
         ca.Function(f"{name}_value", inputs, [rows]),
         ca.Function(f"{name}_jacobian", inputs, [rows, jacobian.nz[:]]),
         ca.Function(f"{name}_hessian", [*inputs, lam], [hessian.nz[:]]),
-        ca.Function(f"{name}_jacobian_pattern", inputs, [jacobian]),
-        ca.Function(f"{name}_hessian_pattern", [*inputs, lam], [hessian]),
+        ca.Function(f"{name}_jacobian_pattern", inputs, [ca.SX.ones(jacobian.sparsity())]),
+        ca.Function(f"{name}_hessian_pattern", [*inputs, lam], [ca.SX.ones(hessian.sparsity())]),
     ]
 
 

@@ -1,49 +1,101 @@
 """Compiles CasADi functions to machine code once, and keeps the result for the next process."""
 
+import hashlib
+import inspect
+import json
 import logging
 import os
 import subprocess
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 
-from walk_optimizer.compiler import compile_library, find_compiler, library_path
+from walk_optimizer.compiler import cache_folder, compile_library, find_compiler, library_path
 
 _LOGGER = logging.getLogger(__name__)
 # -O2 takes half as long again to compile and runs no faster on this straight-line code.
 _FLAGS = ("-O1",)
 _INTERPRETER = "CasADi's slower interpreter"
-# Functions whose names end so are only asked for their sparsity, and need no machine code.
-PATTERN = "_pattern"
+# Folders of this package that say what functions compute, besides the one of the module that builds them.
+_PACKAGE = Path(__file__).parents[1]
+_SOURCES = (_PACKAGE / "model", _PACKAGE / "contact", _PACKAGE / "transcription")
 
 
 @cache
-def compiled(build: Callable[[], list[ca.Function]]) -> dict[str, ca.Function]:
+def compiled(build: Callable[..., list[ca.Function]], *arguments: Hashable) -> dict[str, ca.Function]:
     """Return the functions that `build` makes, by name, compiled where a C compiler is found.
 
     Without a compiler (or with `WALK_OPTIMIZER_CC` set to an empty text) they run in CasADi's
     interpreter: slower, with the same results.
+
+    Args:
+        build: Makes the functions; from the same sources and arguments always the same ones.
+        arguments: Of `build`.
     """
-    functions = {function.name(): function for function in build()}
-    evaluated = {name: function for name, function in functions.items() if not name.endswith(PATTERN)}
     compiler = find_compiler(_INTERPRETER)
     if compiler is None:
+        return _named(build(*arguments))
+    note = _Note(build, arguments, compiler)
+    functions = note.functions()
+    if functions is not None:
         return functions
+    interpreted = _named(build(*arguments))
     try:
-        return functions | _machine_code(evaluated, compiler)
+        library = _library(interpreted, compiler)
+        functions = _loaded(interpreted, library)
+        note.write(library, list(functions))
     except (OSError, RuntimeError, subprocess.CalledProcessError) as error:
         _LOGGER.warning("C code can't be compiled (%s); %s is used", error, _INTERPRETER)
-        return functions
+        return interpreted
+    return functions
 
 
-def _machine_code(functions: dict[str, ca.Function], compiler: str) -> dict[str, ca.Function]:
-    """Return the functions from their shared library, compiling it if the cache has none that loads.
+def _named(functions: Iterable[ca.Function]) -> dict[str, ca.Function]:
+    return {function.name(): function for function in functions}
+
+
+class _Note:
+    """A file that tells which library some sources make, so that nothing has to be built to find it.
+
+    To build the expressions takes longer than all else of a short solve.
+    """
+
+    def __init__(self, build: Callable[..., Any], arguments: tuple[Hashable, ...], compiler: str) -> None:
+        module = Path(inspect.getfile(build))
+        key = hashlib.sha256(f"{module} {build.__qualname__} {arguments!r} {compiler} {_FLAGS}".encode())
+        key.update(ca.__version__.encode())
+        for folder in dict.fromkeys([*_SOURCES, module.parent]):
+            for source in sorted(folder.glob("*.py")):
+                key.update(source.read_bytes())
+        self._path = cache_folder() / f"{build.__name__.strip('<>')}-{key.hexdigest()[:24]}.json"
+
+    def functions(self) -> dict[str, ca.Function] | None:
+        """Return the functions of the library; None without the note, or where the library does not load."""
+        try:
+            note = json.loads(self._path.read_text())
+            return _loaded(note["functions"], cache_folder() / note["library"])
+        except (OSError, ValueError, TypeError, KeyError, RuntimeError):
+            return None
+
+    def write(self, library: Path, functions: list[str]) -> None:
+        """Write the note.
+
+        Raises:
+            OSError: the cache can't be written.
+        """
+        scratch = self._path.with_suffix(f".{os.getpid()}")
+        scratch.write_text(json.dumps({"library": library.name, "functions": functions}))
+        scratch.replace(self._path)
+
+
+def _library(functions: dict[str, ca.Function], compiler: str) -> Path:
+    """Return the shared library of the functions, compiling it if the cache has none that loads.
 
     Raises:
         OSError: the cache can't be written, or the compiler made nothing.
-        RuntimeError: what was compiled can't be loaded.
         CalledProcessError: the compiler failed.
     """
     contents = [ca.__version__, *(function.serialize() for function in functions.values())]
@@ -51,15 +103,22 @@ def _machine_code(functions: dict[str, ca.Function], compiler: str) -> dict[str,
     library = library_path(name, compiler, _FLAGS, parts)
     if library.is_file():
         try:
-            return _loaded(functions, library)
+            _loaded(functions, library)
         except RuntimeError:
             _LOGGER.warning("%s is damaged and is compiled again", library)
             library.unlink(missing_ok=True)
+        else:
+            return library
     compile_library(library, compiler, _FLAGS, lambda folder: [_generated(functions, folder)])
-    return _loaded(functions, library)
+    return library
 
 
 def _loaded(functions: Iterable[str], library: Path) -> dict[str, ca.Function]:
+    """Return the functions of a library.
+
+    Raises:
+        RuntimeError: it can't be loaded.
+    """
     return {name: ca.external(name, str(library)) for name in functions}
 
 

@@ -25,6 +25,6 @@ def stage_functions(name: str, w: ca.SX, s: ca.SX, par: ca.SX, rows: ca.SX, cost
         ca.Function(f"{name}_cost", inputs, [cost]),
         ca.Function(f"{name}_gradient", inputs, [cost, gradient]),
         ca.Function(f"{name}_hessian", [*inputs, sigma, lam], [hessian.nz[:]]),
-        ca.Function(f"{name}_jacobian_pattern", inputs, [jacobian]),
-        ca.Function(f"{name}_hessian_pattern", [*inputs, sigma, lam], [hessian]),
+        ca.Function(f"{name}_jacobian_pattern", inputs, [ca.SX.ones(jacobian.sparsity())]),
+        ca.Function(f"{name}_hessian_pattern", [*inputs, sigma, lam], [ca.SX.ones(hessian.sparsity())]),
     ]
