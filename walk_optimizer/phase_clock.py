@@ -8,6 +8,9 @@ import threading
 from dataclasses import dataclass
 from enum import Enum
 
+# What rounding may add to the distance of two times of the clock, in [s].
+_ROUNDING = 1e-6
+
 
 class Motion(Enum):
     """What the clock of a walk does."""
@@ -44,6 +47,9 @@ class PhaseClock:
     """Follows a clock that may stall, jump or be reset, never backwards.
 
     One thread advances; any thread may pause and resume.
+
+    Attributes:
+        holds: How often the clock has jumped, so that the walk held.
     """
 
     def __init__(self, longest_gap: float = 0.1, ramp: float = 0.3) -> None:
@@ -51,10 +57,13 @@ class PhaseClock:
 
         Args:
             longest_gap: A clock that moved further than this since the last call, in [s], or not
-                forwards, has jumped: the walk then holds instead of jumping with it.
+                forwards, has jumped: the walk then holds instead of jumping with it. From the second jump
+                in a row on it is at rest, and begins to run again over the ramp.
             ramp: Time from a run to a hold, and back, in [s].
         """
         self.longest_gap, self.ramp = longest_gap, ramp
+        self.holds = 0
+        self._jumped = False
         self._clock: float | None = None
         self._motion = Motion.RUNNING
         self._progress = 1.0
@@ -99,12 +108,21 @@ class PhaseClock:
         elapsed = clock - self._clock if self._clock is not None else 0.0
         self._clock = clock
         with self._lock:
-            if not 0 < elapsed <= self.longest_gap:
-                return Advance(0.0, smooth_rate(self._progress))
+            if not 0 <= elapsed <= self.longest_gap + _ROUNDING:
+                return self._held()
+            self._jumped = False
             return self._moved(elapsed)
 
+    def _held(self) -> Advance:
+        """Hold for a jump: a single one changes no velocity, several in a row are a rest."""
+        self.holds += 1
+        if self._jumped:
+            self._progress = 0.0
+        self._jumped = True
+        return Advance(0.0, smooth_rate(self._progress))
+
     def _moved(self, elapsed: float) -> Advance:
-        """Follow the ramp, then hold or run for what is left of the time."""
+        """Follow the ramp, then hold or run for what is left of the time; no time leaves all as it is."""
         running = self._motion is Motion.RUNNING
         begin, goal = self._progress, 1.0 if running else 0.0
         on_ramp = min(elapsed, abs(goal - begin) * self.ramp)

@@ -263,6 +263,7 @@ def test_parameters_are_validated_and_applied_while_running(graph, publisher):
         ("rate", 0.0),
         ("rate", 1e6),
         ("rate", math.nan),
+        ("longest_gap", 0.01),  # A period of the rate: the walk would hold at every other reference.
         ("rate", "fast"),
         ("torque_order", ["u1", "u1", "u2"]),
         ("spring_mode", "rubber"),
@@ -292,6 +293,7 @@ def test_a_bad_parameter_stops_the_start(start):
         ("library_service", "no name"),
         ("cache_folder", "/proc/nowhere"),
         ("joint_torque_limits", [0.5]),  # Less than a stand needs.
+        ("longest_gap", 0.003),  # Less than two periods.
     ):
         node = start("reference_publisher", **{name: value})
         assert node.process.wait(60) == 1
@@ -307,6 +309,13 @@ def test_operators_are_told_why_nothing_is_streamed(graph, start):
         return any(words in one.message for array in heard for one in array.status)
 
     graph.spin_until(lambda: told("the clock stands still, start what publishes /clock"), "the clock")
+    clock, steps = graph.publisher(Clock, "/clock"), itertools.count(1)
+
+    def told_while_it_leaps():
+        clock.publish(Clock(clock=Time(sec=next(steps))))
+        return told("further than `longest_gap` (0.1 s) between two references")
+
+    graph.spin_until(told_while_it_leaps, "a clock that leaps")
     graph.set_parameters(NODE, Parameter("streaming", value=False))
     graph.spin_until(lambda: told("nothing is streamed: the parameter `streaming` is false"), "the parameter")
 

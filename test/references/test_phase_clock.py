@@ -9,6 +9,7 @@ from walk_optimizer.phase_clock import Motion, PhaseClock, smooth_rate
 
 patient = settings(deadline=None, max_examples=60)
 GAP = 0.1
+ROUNDING = 1e-6
 # Normal ticks, stalls, jumps of the clock in both directions.
 TICKS = st.one_of(st.floats(0, 0.02), st.floats(-1e6, 1e6), st.just(0.0))
 COMMANDS = st.sampled_from(["pause", "resume", "stop_at_once", None, None, None])
@@ -26,9 +27,9 @@ def test_the_phase_moves_at_most_as_far_as_the_clock_and_never_back(events):
         time += tick
         moved = clock.advance(time)
         assert 0 <= moved.phase <= max(time - before, 0.0) + 1e-12
-        assert moved.phase <= GAP + 1e-12
+        assert moved.phase <= GAP + ROUNDING
         assert 0 <= moved.rate <= 1
-        if not 0 < time - before <= GAP:
+        if not 0 <= time - before <= GAP + ROUNDING:
             assert moved.phase == 0
 
 
@@ -87,3 +88,21 @@ def test_a_run_is_as_fast_as_the_clock():
     clock = PhaseClock()
     assert [clock.advance(time).phase for time in (5.0, 5.01, 5.03)] == pytest.approx([0.0, 0.01, 0.02])
     assert (smooth_rate(0.0), smooth_rate(0.5), smooth_rate(1.0)) == (0.0, 0.5, 1.0)
+
+
+def test_a_clock_that_moves_just_as_far_as_the_longest_gap_moves_the_walk():
+    clock = PhaseClock(GAP)
+    phases = [clock.advance(tick * GAP).phase for tick in range(1000)]
+    assert phases[1:] == pytest.approx([GAP] * 999)
+    assert clock.holds == 0
+
+
+def test_one_jump_changes_no_velocity_and_from_the_second_in_a_row_on_the_walk_is_at_rest():
+    clock = PhaseClock(GAP, ramp=0.1)
+    times = [5.0, 5.2, 5.25, 5.24, 5.25, 5.4, 5.6, 5.8]
+    moved = [clock.advance(time) for time in times]
+    assert [advance.rate for advance in moved] == [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]
+    assert clock.holds == 5
+    # It does not set off with a jump of the velocity either.
+    assert clock.advance(5.85).rate == pytest.approx(smooth_rate(0.5))
+    assert clock.advance(5.95).rate == 1

@@ -23,6 +23,7 @@ class PublisherHealth:
     ) -> None:
         """Add the checks to a node's."""
         self._diagnostics, self._stream, self._speeds, self._bag = diagnostics, stream, speeds, bag
+        self._holds = 0
         for name, check in zip(_CHECKS, (self._walk, self._timing, self._recording), strict=True):
             diagnostics.add(name, check)
 
@@ -53,12 +54,22 @@ class PublisherHealth:
             for kind, value in zip(("median", "99_percent", "max"), three, strict=True):
                 values[f"{name}_{kind}_ms"] = value * _MILLISECONDS
         values |= {"missed_last_second": punctuality.missed, "missed": self._stream.missed}
+        clock = self._stream.walk.clock
+        held, self._holds = max(clock.holds - self._holds, 0), clock.holds
+        values["clock_jumps"] = clock.holds
         if not self._stream.running:
             return Finding(Level.WARN, "nothing is streamed: the parameter `streaming` is false", values)
         if self._stream.silence > _LONG_SILENCE:
             text = (
                 f"no reference for {self._stream.silence:.1f} s: the clock stands still, start what "
                 "publishes /clock or set `use_sim_time` to false; or see `reference lost` in the log"
+            )
+            return Finding(Level.WARN, text, values)
+        if held:
+            text = (
+                f"the clock moved back, or further than `longest_gap` ({clock.longest_gap:g} s) between two "
+                f"references, {held} times in the last second: the walk holds then; if the clock has to run "
+                "so, raise `longest_gap`"
             )
             return Finding(Level.WARN, text, values)
         if punctuality.missed:

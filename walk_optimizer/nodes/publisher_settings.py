@@ -17,6 +17,10 @@ from walk_optimizer.request import GaitRequest
 CERTIFIED, BLENDED = "certified", "blended"
 
 
+# A gap of fewer periods of the references than this would be exceeded in the ordinary run.
+_LEAST_PERIODS = 2.0
+
+
 def _check_speed(speed: float) -> None:
     if speed != 0:
         GaitRequest.for_speed(speed)
@@ -98,7 +102,14 @@ SETTINGS = [
         "needs more, or the steps to it or from it to a stand, is refused [rad/s].",
         check=limits_of,
     ),
-    Setting("longest_gap", 0.1, "A clock that moves further than this at once has jumped [s].", 0.002, 10.0),
+    Setting(
+        "longest_gap",
+        0.1,
+        "A clock that moves further than this between two references has jumped, and the walk holds; "
+        f"{_LEAST_PERIODS:g} periods of `rate` at least [s].",
+        0.002,
+        10.0,
+    ),
     Setting(
         "joint_names",
         list(JOINTS),
@@ -208,6 +219,28 @@ def stream_format(parameters: NodeParameters) -> StreamFormat:
         command_interface=parameters["command_interface"],
         frame_id=parameters["frame_id"],
     )
+
+
+RATE_SETTINGS = {"rate", "longest_gap"}
+
+
+def require_steady(parameters: NodeParameters, changes: Mapping[str, Any] | None = None) -> None:
+    """Refuse references so far apart that the walk would hold at each of them.
+
+    Args:
+        parameters: Of the node.
+        changes: Values that count instead of the parameters.
+
+    Raises:
+        ConfigurationError: says what would do.
+    """
+    rate, gap = ((changes or {}).get(name, parameters[name]) for name in ("rate", "longest_gap"))
+    if rate * gap < _LEAST_PERIODS:
+        raise ConfigurationError(
+            f"longest_gap is {gap:g} s and rate {rate:g} Hz, so the walk would hold at references that come "
+            f"in time; allowed is a longest_gap of at least {_LEAST_PERIODS / rate:g} s at this rate, or a "
+            f"rate of at least {_LEAST_PERIODS / gap:g} Hz with this gap"
+        )
 
 
 LIMIT_SETTINGS = {"joint_torque_limits", "joint_speed_limits"}

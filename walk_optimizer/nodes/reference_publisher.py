@@ -21,8 +21,10 @@ from walk_optimizer.nodes.publisher_health import PublisherHealth
 from walk_optimizer.nodes.publisher_settings import (
     FORMAT_SETTINGS,
     LIMIT_SETTINGS,
+    RATE_SETTINGS,
     SETTINGS,
     joint_limits,
+    require_steady,
     stream_format,
 )
 from walk_optimizer.nodes.recording_control import RecordingControl
@@ -50,7 +52,7 @@ class ReferencePublisherNode(ManagedNode):
         """Declare the parameters; `configure` does the rest."""
         super().__init__("reference_publisher", SETTINGS)
         self._undo = ExitStack()
-        self.add_on_set_parameters_callback(self._keep_limits_met)
+        self.add_on_set_parameters_callback(self._check_together)
         self.parameters.apply_changes(self._apply)
 
     def configure(self) -> None:
@@ -77,6 +79,7 @@ class ReferencePublisherNode(ManagedNode):
         Raises:
             ConfigurationError: parameters don't fit each other, or the walker.
         """
+        require_steady(self.parameters)
         self._commands.limits = joint_limits(self.parameters)
         try:
             stand = self._commands.begin()
@@ -149,13 +152,14 @@ class ReferencePublisherNode(ManagedNode):
         )
         response.message = f"{gait}, two steps of it in {cycle.time.size} points"
 
-    def _keep_limits_met(self, changes: list[Parameter]) -> SetParametersResult:
-        """Refuse limits that what is walked now does not meet."""
-        values = {change.name: change.value for change in changes if change.name in LIMIT_SETTINGS}
-        if not values or not self.active:
-            return SetParametersResult(successful=True)
+    def _check_together(self, changes: list[Parameter]) -> SetParametersResult:
+        """Refuse values that don't fit others, or limits that what is walked now does not meet."""
+        values = {change.name: change.value for change in changes}
         try:
-            self._commands.require_met(joint_limits(self.parameters, values))
+            if values.keys() & RATE_SETTINGS:
+                require_steady(self.parameters, values)
+            if values.keys() & LIMIT_SETTINGS and self.active:
+                self._commands.require_met(joint_limits(self.parameters, values))
         except WalkOptimizerError as error:
             return SetParametersResult(successful=False, reason=f"{', '.join(values)}: {error}")
         return SetParametersResult(successful=True)
