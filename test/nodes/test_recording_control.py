@@ -1,6 +1,7 @@
 """Recording beside everything else: the disk may take its time, the node answers meanwhile."""
 
 import errno
+import gc
 import os
 import threading
 
@@ -99,6 +100,8 @@ class Running:
         self.close()
         self._executor.shutdown()
         self.node.destroy_node()
+        del self.node, self._executor
+        gc.collect()  # Or what is left of the node takes the log of the next one of its name with it.
 
 
 @pytest.fixture
@@ -204,6 +207,7 @@ def test_after_a_full_disk_another_folder_is_recorded_to(graph, publisher, tmp_p
     disk.full = True
     wait_for(graph, heard, DiagnosticStatus.ERROR, "recording has ended: Cannot write")
     disk.full = False
+    graph.spin_for(1.0)
     graph.spin_until(lambda: any(one.level == ERROR for one in told), "the log", 30.0)
     (error,) = [one for one in told if one.level == ERROR]
     assert (error.name, "No space left on device; free space" in error.msg) == (NODE, True)
