@@ -21,6 +21,10 @@ class GaitFileError(WalkOptimizerError):
     """A gait file that is missing, damaged, of another version or not writable."""
 
 
+class GaitNotWritableError(GaitFileError):
+    """A gait file, or the folder of such files, that can't be written."""
+
+
 class GaitNotFoundError(WalkOptimizerError, LookupError):
     """The library holds no such gait."""
 

@@ -7,7 +7,7 @@ Owns what happens to files that can't be used. Does not own which gait answers a
 import os
 from pathlib import Path
 
-from walk_optimizer.errors import GaitFileError, GaitNotFoundError
+from walk_optimizer.errors import GaitFileError, GaitNotFoundError, GaitNotWritableError
 from walk_optimizer.gait import Gait
 from walk_optimizer.gait_files import SUFFIX, gait_file_name, read_gait_file, write_gait_file
 from walk_optimizer.gait_files.access import writable_folder
@@ -87,6 +87,7 @@ class GaitLibrary:
         # Replaced as a whole, never changed: another thread that looks a gait up sees the old or the new.
         self._entries = tuple(sorted(entries.values(), key=table_order))
         self._problems = tuple(problems)
+        self._unsaved: dict[Path, str] = {}
 
     def entries(self) -> tuple[LibraryEntry, ...]:
         """Return all gaits with their files, by mode, speed and number of points."""
@@ -99,6 +100,10 @@ class GaitLibrary:
     def problems(self) -> list[str]:
         """Return a sentence for each file that was set aside; it begins with the path."""
         return list(self._problems)
+
+    def unsaved(self) -> list[str]:
+        """Return a sentence for each gait that is in memory only, because its file can't be written."""
+        return list(self._unsaved.values())
 
     def summaries(self) -> list[GaitSummary]:
         """Return one row a gait, in the order of `gaits`."""
@@ -135,28 +140,40 @@ class GaitLibrary:
             raise GaitNotFoundError(f"{error}{set_aside}") from error
 
     def store(self, gait: Gait) -> Path:
-        """Write a gait into the folder and serve it from now on.
+        """Write a gait into the folder and serve it from now on, even if it can't be written.
 
         Returns:
             Its file; a former one of the same request is replaced. The packaged table's gait is
             still served when its F is smaller.
 
         Raises:
-            GaitFileError: the gait is not certified or for another walker, or can't be written.
+            GaitFileError: the gait is not certified, for another walker, or a number is not finite.
+            GaitNotWritableError: it can't be written, and is lost when this process ends.
         """
         if not gait.certificate.certified:
             failed = ", ".join(entry.family for entry in gait.certificate.failures()) or "no certificate"
             raise GaitFileError(f"only certified gaits are stored; this one fails: {failed}")
         if gait.walker != self.walker:
             raise GaitFileError("the gait is for another walker than the library")
-        writable_folder(self.folder, self._create)
         path = self.folder / gait_file_name(gait)
-        write_gait_file(gait, path)
+        self._serve(gait, path)
+        try:
+            writable_folder(self.folder, self._create)
+            write_gait_file(gait, path)
+        except GaitFileError as error:
+            self._unsaved[path] = str(error)
+            raise GaitNotWritableError(
+                f"the gait is kept in memory only, and lost when this process ends: {error}"
+            ) from error
+        self._serve(gait, path)
+        self._unsaved.pop(path, None)
+        self._problems = tuple(text for text in self._problems if not text.startswith(f"{path}:"))
+        return path
+
+    def _serve(self, gait: Gait, path: Path) -> None:
         entries = {e.path.name: e for e in self._entries if e.path != path}
         _keep_better(entries, LibraryEntry(gait, Source.CACHE, path))
         self._entries = tuple(sorted(entries.values(), key=table_order))
-        self._problems = tuple(text for text in self._problems if not text.startswith(f"{path}:"))
-        return path
 
 
 def _gait_files(walker: WalkerParameters, folder: Path) -> list[tuple[Path, Source]]:

@@ -9,6 +9,7 @@ import yaml
 
 pytest.importorskip("rclpy")
 
+from diagnostic_msgs.msg import DiagnosticArray
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from library.made_up_gait import made_up_gait
@@ -16,11 +17,12 @@ from nodes.conftest import FAST, HIP_MASS, SLOW
 from nodes.graph import children_of, exists, workers_of
 from rclpy.parameter import Parameter
 from walk_optimizer_interfaces.msg import GaitTable
-from walk_optimizer_interfaces.srv import GetGait, ListGaits, OptimizeGait
+from walk_optimizer_interfaces.srv import GetGait, ListGaits, OptimizeGait, Rebuild
 
 from walk_optimizer.gait_files import codec, gait_file_name, write_gait_file
 from walk_optimizer.library import GaitLibrary, Selection
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
+from walk_optimizer.nodes.conversions import gait_to_message, report_to_message
 from walk_optimizer.nodes.qos import LATCHED
 from walk_optimizer.nodes.qos import SERVICE as SERVICE_QOS
 from walk_optimizer.request import gait_table_settings
@@ -220,6 +222,43 @@ def test_a_folder_that_cannot_be_written_stops_the_start(start, tmp_path):
         assert node.process.wait(60) == 1
         assert f"can't start: {place}: the gait folder {places[place]}" in node.output()
         assert "Traceback" not in node.output()
+
+
+def test_a_solved_gait_that_can_not_be_stored_is_served_and_told(graph, start, stocked):
+    """With an optimizer that answers at once, and a folder that goes away like a full disk."""
+    gait = made_up_gait(speed=0.4, mode="none", walker=WalkerParameters(hip_mass=HIP_MASS))
+
+    def solve(_request, response):
+        response.success = True
+        response.gait, response.report = gait_to_message(gait), report_to_message(gait.report)
+        return response
+
+    graph.node.create_service(OptimizeGait, OPTIMIZE, solve, qos_profile=SERVICE_QOS)
+    heard = graph.subscribe(DiagnosticArray, "/diagnostics")
+    start("gait_library", **stocked)
+    graph.client(GetGait, GET)
+    folder = stocked["cache_folder"]
+    away = folder.rename(folder.with_name("away"))
+    wanted = {"speed": 0.4, "spring_mode": "none", "selection": "exact"}
+    answer = graph.call(GetGait, GET, **wanted)
+    assert (answer.success, answer.source) == (True, "optimizer"), answer.message
+    assert f"the gait is kept in memory only, and lost when this process ends: {folder}" in answer.message
+    assert graph.call(GetGait, GET, **wanted).gait == answer.gait
+
+    def told(words):
+        return any(words in one.message for array in heard for one in array.status if one.level == b"\x01")
+
+    graph.spin_until(lambda: told("1 gaits are in memory only"), "the finding")
+    rebuild = {"speeds": [0.4], "spring_modes": ["none"]}
+    refused = graph.call(Rebuild, "gait_library/rebuild", **rebuild)
+    assert (refused.success, "kept in memory only" in refused.message) == (False, True)
+    away.rename(folder)
+    assert graph.call(Rebuild, "gait_library/rebuild", **rebuild).success
+    assert (folder / gait_file_name(gait)).is_file()
+    heard.clear()
+    graph.spin_until(
+        lambda: any(one.message == "3 gaits" for array in heard for one in array.status), "all well"
+    )
 
 
 @pytest.mark.slow

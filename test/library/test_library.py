@@ -1,5 +1,6 @@
 """The library serves what is whole, says what is not, and never invents an answer."""
 
+import errno
 import math
 import os
 import signal
@@ -12,7 +13,7 @@ import pytest
 from library.made_up_gait import all_modes, made_up_gait
 
 from walk_optimizer import library as library_module
-from walk_optimizer.errors import GaitFileError, GaitNotFoundError, InvalidRequestError
+from walk_optimizer.errors import GaitFileError, GaitNotFoundError, GaitNotWritableError, InvalidRequestError
 from walk_optimizer.gait_files import gait_file_name, write_gait_file
 from walk_optimizer.library import GaitLibrary, Source, cache_folder
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
@@ -229,6 +230,25 @@ def test_a_cache_below_a_file_is_refused(table, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     with pytest.raises(GaitFileError, match="the gait folder is not writable: Not a directory"):
         GaitLibrary(WALKER, writable=True)
+
+
+def test_a_gait_that_the_disk_has_no_space_for_is_served_from_memory(table, folder, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    library = GaitLibrary(WALKER, folder)
+    gait = made_up_gait(speed=0.6)
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(GaitNotWritableError, match=r"in memory only, .*: .*No space left"):
+            library.store(gait)
+    assert library.find(0.6, "none") == (gait, Source.CACHE)
+    (unsaved,) = library.unsaved()
+    assert "can't be written: No space left on device" in unsaved
+    assert not list(folder.glob("*0.6*"))
+    path = library.store(gait)
+    assert path.is_file()
+    assert library.unsaved() == []
 
 
 WRITER = """

@@ -207,7 +207,6 @@ def test_after_a_full_disk_another_folder_is_recorded_to(graph, publisher, tmp_p
     disk.full = True
     wait_for(graph, heard, DiagnosticStatus.ERROR, "recording has ended: Cannot write")
     disk.full = False
-    graph.spin_for(1.0)
     graph.spin_until(lambda: any(one.level == ERROR for one in told), "the log", 30.0)
     (error,) = [one for one in told if one.level == ERROR]
     assert (error.name, "No space left on device; free space" in error.msg) == (NODE, True)

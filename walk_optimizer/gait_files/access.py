@@ -6,7 +6,7 @@ import stat
 import tempfile
 from pathlib import Path
 
-from walk_optimizer.errors import GaitFileError
+from walk_optimizer.errors import GaitFileError, GaitNotWritableError
 from walk_optimizer.resources import sync_directory
 
 
@@ -40,7 +40,7 @@ def replace_file(path: Path, data: bytes) -> None:
     """Give a file a new content such that a crash leaves either the old or the new one.
 
     Raises:
-        GaitFileError: the file can't be written; a former one is as before.
+        GaitNotWritableError: the file can't be written; a former one is as before.
     """
     draft = None
     try:
@@ -54,7 +54,7 @@ def replace_file(path: Path, data: bytes) -> None:
         draft.replace(path)
         sync_directory(path.parent)
     except OSError as error:
-        raise GaitFileError(f"{path}: can't be written: {error.strerror}") from error
+        raise GaitNotWritableError(f"{path}: can't be written: {error.strerror}") from error
     finally:
         # Also on Ctrl-C: only a killed process leaves its draft, which no reader takes for a gait.
         if draft is not None:
@@ -70,20 +70,22 @@ def writable_folder(folder: Path, create: bool) -> None:
         create: Whether to create it when it is missing.
 
     Raises:
-        GaitFileError: the folder is missing, a link, no folder, or not writable; the message names it.
+        GaitNotWritableError: the folder is missing, a link, no folder, or not writable; the message names it.
     """
     if folder.is_symlink():
-        raise GaitFileError(f"{folder}: the gait folder is a symbolic link, which is not written through")
+        raise GaitNotWritableError(
+            f"{folder}: the gait folder is a symbolic link, which is not written through"
+        )
     try:
         if create:
             folder.mkdir(parents=True, exist_ok=True)
         if not folder.is_dir():
-            raise GaitFileError(f"{folder}: the gait folder is missing; create it or name another")
+            raise GaitNotWritableError(f"{folder}: the gait folder is missing; create it or name another")
         # Permissions alone do not tell: the file system may be read-only, or full.
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise GaitFileError(f"{folder}: the gait folder is not writable: {error.strerror}") from error
+        raise GaitNotWritableError(f"{folder}: the gait folder is not writable: {error.strerror}") from error
 
 
 def writable_target(path: Path) -> None:

@@ -7,7 +7,13 @@ from pathlib import Path
 from walk_optimizer_interfaces.msg import GaitTable
 from walk_optimizer_interfaces.srv import GetGait, ListGaits, OptimizeGait, Rebuild
 
-from walk_optimizer.errors import GaitNotFoundError, InvalidRequestError, SolveFailedError, WalkOptimizerError
+from walk_optimizer.errors import (
+    GaitNotFoundError,
+    GaitNotWritableError,
+    InvalidRequestError,
+    SolveFailedError,
+    WalkOptimizerError,
+)
 from walk_optimizer.gait import Gait
 from walk_optimizer.library import EXACT_SPEED_TOLERANCE, GaitLibrary, Selection, Source, parse_selection
 from walk_optimizer.model.parameters import SpringMode
@@ -28,6 +34,7 @@ OPTIMIZER = "optimizer"
 _TABLE = gait_table_settings()
 # Gaits that one request may have rebuilt: the table three times over.
 _MOST_REBUILT = 63
+_FREE_SPACE = "make the folder writable or free space, then call ~/rebuild for them"
 
 SETTINGS = [
     WALKER_FILE,
@@ -129,10 +136,11 @@ class GaitLibraryNode(ManagedNode):
                 throttle_duration_sec=1.0,
             )
             try:
-                gait = await self._solve(wanted)
+                gait, warning = await self._solve(wanted)
             except ServiceUnavailableError as away:
                 raise ServiceUnavailableError(f"{error}; {away}") from away
-            return gait, OPTIMIZER, "solved now" if selection is Selection.EXACT else f"solved now; {error}"
+            reason = "" if selection is Selection.EXACT else str(error)
+            return gait, OPTIMIZER, "; ".join(filter(None, ("solved now", reason, warning)))
         blended = source is Source.INTERPOLATED
         return gait, source.value, gait.report.message if blended else f"from the {source.value}"
 
@@ -153,11 +161,11 @@ class GaitLibraryNode(ManagedNode):
             wanted.speed, wanted.spring_mode, selection, tolerance=EXACT_SPEED_TOLERANCE
         )
 
-    async def _solve(self, wanted: GaitRequest) -> Gait:
-        """Have a gait solved, and store it.
+    async def _solve(self, wanted: GaitRequest) -> tuple[Gait, str]:
+        """Have a gait solved, store it, and return it with a warning where it can't be stored.
 
         Raises:
-            WalkOptimizerError: the optimizer refused or is not there, or the gait can't be stored.
+            WalkOptimizerError: the optimizer refused or is not there.
         """
         request = OptimizeGait.Request(
             speed=wanted.speed, spring_mode=wanted.spring_mode.value, points=wanted.points
@@ -166,10 +174,19 @@ class GaitLibraryNode(ManagedNode):
         if not answer.success:
             raise SolveFailedError(answer.message)
         gait = gait_from_message(answer.gait, answer.report, self._library.walker, wanted)
-        self._library.store(gait)
+        warning = self._store(gait)
         self._blends.forget()
         self._publish_table()
-        return gait
+        return gait, warning
+
+    def _store(self, gait: Gait) -> str:
+        """Store a gait, and return why it can't be; empty if it can. It is served nevertheless."""
+        try:
+            self._library.store(gait)
+        except GaitNotWritableError as error:
+            self.get_logger().warning(f"{error}; {_FREE_SPACE}")
+            return str(error)
+        return ""
 
     async def _list(self, _request: ListGaits.Request, response: ListGaits.Response) -> None:
         response.table = self._table_message()
@@ -191,12 +208,12 @@ class GaitLibraryNode(ManagedNode):
             raise SolveFailedError("; ".join([response.message, *failures]))
 
     async def _failure_of(self, wanted: GaitRequest) -> str:
-        """Solve a gait again, and return why that failed, if it did."""
+        """Solve a gait again, and return why that or storing it failed, if it did."""
         try:
-            await self._solve(wanted)
+            _, problem = await self._solve(wanted)
         except WalkOptimizerError as error:
-            return f"{wanted.speed:.4f} m/s, {wanted.spring_mode}: {error}"
-        return ""
+            problem = str(error)
+        return f"{wanted.speed:.4f} m/s, {wanted.spring_mode}: {problem}" if problem else ""
 
     def _publish_table(self) -> None:
         self._table.publish(self._table_message())
@@ -213,6 +230,10 @@ class GaitLibraryNode(ManagedNode):
         sources = Counter(entry.source.value for entry in entries)
         values: dict[str, object] = {source.value: sources[source] for source in Source}
         values |= {"set_aside": len(problems), "folder": self._library.folder}
+        unsaved = self._library.unsaved()
+        if unsaved:
+            text = f"{len(unsaved)} gaits are in memory only: {unsaved[0]}; {_FREE_SPACE}"
+            return Finding(Level.WARN, text, values | {"in_memory_only": len(unsaved)})
         if problems:
             return Finding(Level.WARN, f"{len(problems)} gait files set aside: {problems[0]}", values)
         if not entries:

@@ -16,12 +16,14 @@ from walk_optimizer.model.parameters import KneeSpring
 from walk_optimizer.nodes.publisher_settings import BLENDED
 from walk_optimizer.nodes.streamed_gait import Goal, pace_of_goal, profile_of_goal
 from walk_optimizer.nodes.suite_node import SuiteNode
+from walk_optimizer.nodes.walker_setting import walker_of
 from walk_optimizer.profile import RefinedProfile
 from walk_optimizer.solve.worker import BusyError, WorkerPool
 from walk_optimizer.solve.worker_task import Ticket
 from walk_optimizer.stand import StandProfile
 from walk_optimizer.transition.paces import Pace, border_state, pace_name, spring_of
 from walk_optimizer.transition.standing import Standing
+from walk_optimizer.transition.table import cache_folder
 from walk_optimizer.transition_job import TransitionJob, transition_job
 from walk_optimizer.walk import StepPlan
 
@@ -55,8 +57,9 @@ class TransitionPlanner:
             GaitFileError: the cache folder is missing, a symbolic link or not writable.
         """
         self._node = node
-        if node.parameters["cache_folder"]:
-            writable_folder(Path(node.parameters["cache_folder"]), create=False)
+        named = node.parameters["cache_folder"]
+        walker = walker_of(node.parameters["walker_file"])
+        writable_folder(Path(named) if named else cache_folder(walker), create=not named)
         self._known: OrderedDict[_Ends, tuple[RefinedGait, ...]] = OrderedDict()
         self._pool: WorkerPool | None = None
         self._ticket: Ticket | None = None
