@@ -4,17 +4,20 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist, Vector3
 from nodes.graph import exists, workers_of
 from nodes.walking import MODE, NODE, Walker
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 from walk_optimizer_interfaces.srv import SetGait
 
 pytestmark = pytest.mark.ros
 
 # Of the packaged table, which has no steps from the one to the other: they take seconds to solve for.
 SLOWEST, FASTEST = 0.20 / 0.85, 0.50 / 0.46
-MEDIUM, FASTER = 0.35 / 0.655, 0.40 / 0.59
+SLOW, MEDIUM, FASTER = 0.25 / 0.785, 0.35 / 0.655, 0.40 / 0.59
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +76,45 @@ def test_a_later_command_ends_the_solve_for_an_earlier_one(graph, walker, publis
     assert (refused.success, refused.message) == (False, "a later command came first")
     # Not one that was let run to its end: its process is gone.
     graph.spin_until(lambda: not any(exists(worker) for worker in workers), "the end of the worker")
+
+
+@pytest.fixture
+def works_on(graph):
+    """Tells whether the publisher says that it works on a speed."""
+    diagnostics = graph.subscribe(DiagnosticArray, "/diagnostics")
+
+    def works_on(speed):
+        walk = [one for array in diagnostics for one in array.status if one.name == f"{NODE}: walk"]
+        return bool(walk) and f"working on {speed:.4f} m/s for " in walk[-1].message
+
+    return works_on
+
+
+def test_a_set_point_ends_the_work_on_the_one_before(graph, walker, works_on):
+    walker.walk(SLOWEST)
+    speed = walker.talk(Float64, "target_speed")
+    speed.publish(Float64(data=FASTEST))
+    graph.spin_until(lambda: works_on(FASTEST), "the solve")
+    speed.publish(Float64(data=SLOW))
+    walker.wait_for("walking", SLOW)
+    assert not any(state.target_speed == pytest.approx(FASTEST) for state in walker.states)
+
+
+def test_a_stream_ends_the_work_on_a_speed_when_it_holds_another(graph, walker, works_on):
+    walker.walk(SLOWEST)
+    velocity = walker.talk(Twist, "cmd_vel")
+
+    def send(speed):
+        velocity.publish(Twist(linear=Vector3(x=speed)))
+
+    graph.spin_until(lambda: send(FASTEST) or works_on(FASTEST), "the solve")
+
+    def walks_slowly():
+        send(SLOW)
+        return (walker.states[-1].state, walker.states[-1].speed) == ("walking", pytest.approx(SLOW))
+
+    graph.spin_until(walks_slowly, "the other speed")
+    assert not any(state.target_speed == pytest.approx(FASTEST) for state in walker.states)
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from walk_optimizer.nodes.bag import StreamBag
 from walk_optimizer.nodes.diagnostics import Diagnostics, Finding, Level
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.speed_commands import SpeedCommands
+from walk_optimizer.nodes.walk_commands import WalkCommands
 from walk_optimizer.phase_clock import Motion
 from walk_optimizer.recording.disk import free_bytes
 from walk_optimizer.recording.status import RecorderStatus
@@ -19,10 +20,16 @@ class PublisherHealth:
     """The checks of the publisher. Owns their sentences, not what they look at."""
 
     def __init__(
-        self, diagnostics: Diagnostics, stream: JointStream, speeds: SpeedCommands, bag: StreamBag
+        self,
+        diagnostics: Diagnostics,
+        stream: JointStream,
+        commands: WalkCommands,
+        speeds: SpeedCommands,
+        bag: StreamBag,
     ) -> None:
         """Add the checks to a node's."""
-        self._diagnostics, self._stream, self._speeds, self._bag = diagnostics, stream, speeds, bag
+        self._diagnostics, self._stream, self._bag = diagnostics, stream, bag
+        self._commands, self._speeds = commands, speeds
         self._holds = 0
         for name, check in zip(_CHECKS, (self._walk, self._timing, self._recording), strict=True):
             diagnostics.add(name, check)
@@ -36,7 +43,7 @@ class PublisherHealth:
         report = self._stream.report
         if report is None:
             return Finding(Level.OK, "nothing is streamed yet")
-        text = str(report)
+        text = "; ".join(filter(None, (str(report), self._commands.under_way)))
         values = {"state": report.state, "speed": report.speed, "target_speed": report.target_speed}
         if report.state == Motion.EMERGENCY_STOP.value:
             return Finding(Level.ERROR, text, values)

@@ -20,6 +20,8 @@ from walk_optimizer.request import GaitRequest
 _WATCH_PERIOD = 0.05
 # A speed that was refused is not asked for again within this time, however often it is sent, in [s].
 _REFUSAL_HOLDS = 1.0
+# Commands of which all but the last are superseded, and end as soon as the library has answered them.
+_MOST_UNDER_WAY = 3
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,9 @@ _STAND = _Target(None)
 class SpeedCommands:
     """Follows speeds as they come: of those that come while a gait is fetched, the last one counts.
 
+    A set-point supersedes what is under way at once. A stream does so when it holds a speed, that is sends it
+    twice in a row: of one that changes all the time, one speed after the other is followed to its end.
+
     A speed that is refused changes nothing, and keeps no stream alive. Speed 0 is a stop.
     """
 
@@ -54,7 +59,8 @@ class SpeedCommands:
         self._waiting: _Target | None = None
         self._current: _Target | None = None
         self._refused: tuple[_Target, float] | None = None
-        self._following = False
+        self._last_of_stream: _Target | None = None
+        self._under_way = 0
         self._ignored = IgnoredParts()
         self._timer: Timer | None = None
         for kind, topic, callback in (
@@ -82,7 +88,7 @@ class SpeedCommands:
         target = self._target(message.data) if self._node.active else None
         if target is not None:
             self._watch_no_more()
-            self._take(target)
+            self._take(target, supersedes=True)
 
     def _on_twist(self, message: Twist) -> None:
         target = self._twist_target(message) if self._node.active else None
@@ -91,7 +97,8 @@ class SpeedCommands:
             # Only now: each time that the executor wakes costs the stream a tick at 1 kHz.
             if self._timer is None:
                 self._timer = self._node.repeat(_WATCH_PERIOD, self._look)
-            self._take(target)
+            self._take(target, supersedes=target == self._last_of_stream)
+            self._last_of_stream = target
 
     def _twist_target(self, message: Twist) -> _Target | None:
         """Return what a velocity asks for, and warn of what it asks for in vain; None where it is refused."""
@@ -115,9 +122,17 @@ class SpeedCommands:
             self._tell_refusal(error)
             return None
 
-    def _take(self, target: _Target) -> None:
-        """Follow a target, unless that is done already."""
-        if target == self._current or self._was_just_refused(target):
+    def _take(self, target: _Target, supersedes: bool) -> None:
+        """Follow a target, unless that is done already.
+
+        Args:
+            target: The last one that was asked for.
+            supersedes: Whether what is under way ends at once, instead of being followed before.
+        """
+        if self._was_just_refused(target):
+            return
+        if target == self._current:
+            self._waiting = None
             return
         if target == _STAND:
             # A stop waits for nothing; what is being fetched then comes too late to count.
@@ -125,8 +140,10 @@ class SpeedCommands:
             self._node.later(self._carry_out, target)
             return
         self._waiting = target
-        if not self._following:
-            self._following = True
+        if supersedes:
+            self._commands.supersede()
+        if self._under_way < (_MOST_UNDER_WAY if supersedes else 1):
+            self._under_way += 1
             self._node.later(self._follow)
 
     async def _follow(self) -> None:
@@ -136,7 +153,7 @@ class SpeedCommands:
                 self._waiting, self._current = None, target
                 await self._carry_out(target)
         finally:
-            self._following = False
+            self._under_way -= 1
 
     async def _carry_out(self, target: _Target) -> None:
         try:
@@ -147,7 +164,8 @@ class SpeedCommands:
         except WalkOptimizerError as error:
             self._tell_refusal(error)
             self._refused = target, time.monotonic()
-            self._current = None
+            if self._current is target:
+                self._current = None
             return
         self._node.get_logger().info(text, throttle_duration_sec=1.0)
 
@@ -173,7 +191,7 @@ class SpeedCommands:
             self._node.get_logger().warning(
                 f"no speed on ~/cmd_vel for {self.watch.timeout:g} s: coming to a stand"
             )
-            self._take(_STAND)
+            self._take(_STAND, supersedes=True)
 
     def _now(self) -> float:
         """Return the time of the node's clock in [s]."""

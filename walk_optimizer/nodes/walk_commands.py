@@ -1,5 +1,7 @@
 """From commands to steps: which speed is to be walked, and how the walk gets there."""
 
+import time
+
 from walk_optimizer_interfaces.srv import GetGait
 
 from walk_optimizer.errors import GaitNotFoundError, WalkOptimizerError
@@ -10,7 +12,7 @@ from walk_optimizer.nodes.lifecycle import ManagedNode
 from walk_optimizer.nodes.remote_service import RemoteService
 from walk_optimizer.nodes.streamed_gait import StreamedGait
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
-from walk_optimizer.nodes.transition_planner import NoTransitionError, TransitionPlanner
+from walk_optimizer.nodes.transition_planner import TransitionPlanner
 from walk_optimizer.phase_clock import Motion
 from walk_optimizer.profile import StepProfile
 from walk_optimizer.request import GaitRequest
@@ -35,9 +37,15 @@ class EmergencyStopError(WalkOptimizerError):
 class _Order:
     """A command for as long as it is carried out."""
 
-    def __init__(self) -> None:
+    def __init__(self, request: GaitRequest) -> None:
         """Count, until `end`."""
-        self._end = ""
+        self._speed, self._began, self._end = request.speed, time.monotonic(), ""
+
+    def __str__(self) -> str:
+        """Return what is being done, if it is; empty otherwise."""
+        if self._end:
+            return ""
+        return f"working on {self._speed:.4f} m/s for {time.monotonic() - self._began:.0f} s"
 
     def end(self, reason: str) -> None:
         """Count no more, for the first of the reasons that are given."""
@@ -82,7 +90,7 @@ class WalkCommands:
         settings = transition_settings()
         self._standing = standing_pose(walker, settings.feet_distance, settings.knee_bend)
         self.limits = JointLimits()
-        self._order = _Order()
+        self._order: _Order | None = None
 
     def begin(self) -> StandProfile:
         """Return what the stream begins with.
@@ -94,6 +102,11 @@ class WalkCommands:
         standing = self._needed(_TO_STAND, stand)
         self._needs = WalkNeeds(stand, PaceNeeds((standing,)))
         return stand
+
+    @property
+    def under_way(self) -> str:
+        """What is being fetched or solved for, and since when; empty for nothing."""
+        return "" if self._order is None else str(self._order)
 
     def require_met(self, limits: JointLimits) -> None:
         """Refuse limits that what is walked now, what is about to be, or its stop does not meet.
@@ -117,23 +130,29 @@ class WalkCommands:
                 command came first.
         """
         self._require_no_emergency()
-        order = self._take_order()
+        self.supersede()
+        self._order = order = _Order(request)
+        try:
+            return await self._carry_out(request, order, wait_for_library)
+        except WalkOptimizerError:
+            order.require_valid()  # If it does not count any more, nothing else matters.
+            raise
+        finally:
+            order.end("it has been carried out")
+
+    async def _carry_out(self, request: GaitRequest, order: _Order, wait_for_library: bool) -> str:
         gait, source = await self._fetch(request, order if wait_for_library else None)
         order.require_valid()
         keeping = self._needed(f"to walk at {gait.speed:.4f} m/s", gait.profile)
         stand = self._stand_after(gait)
-        try:
-            stop = await self._planner.plan(gait, stand, self._torque_limit)
-            stopping = self._needed(f"to stop from {gait.speed:.4f} m/s", *stop.steps, stand)
-            await self._lead_to(gait, order, (keeping, stopping))
-        except NoTransitionError:
-            order.require_valid()  # If it does not count any more, that has cancelled the solve.
-            raise
+        stop = await self._planner.plan(gait, stand, self._torque_limit)
+        stopping = self._needed(f"to stop from {gait.speed:.4f} m/s", *stop.steps, stand)
+        await self._lead_to(gait, order, (keeping, stopping))
         return f"{gait} from the next step on; {source}"
 
     def stop(self) -> str:
         """Have the walk come to a stand, and return a sentence about it; it waits for nothing."""
-        self._take_order()
+        self.supersede()
         pace = self._stream.pace
         while isinstance(pace, StreamedGait):
             stand = self._stand_after(pace)
@@ -146,6 +165,10 @@ class WalkCommands:
             pace = self._stream.pace
         self._stream.walk.stay(pace)
         return "stands already, or is about to"
+
+    def supersede(self) -> None:
+        """End what is under way: another command counts from now on."""
+        self._end_order("a later command came first")
 
     def give_up(self) -> None:
         """Let nothing begin any more that was asked for before an emergency stop, except a stop.
@@ -162,14 +185,9 @@ class WalkCommands:
         if self._stream.walk.clock.motion is Motion.EMERGENCY_STOP:
             raise EmergencyStopError("emergency stop; call ~/resume to release it, then ask again")
 
-    def _take_order(self) -> _Order:
-        """Return a command that counts from now on, and none else."""
-        self._end_order("a later command came first")
-        self._order = _Order()
-        return self._order
-
     def _end_order(self, reason: str) -> None:
-        self._order.end(reason)
+        if self._order is not None:
+            self._order.end(reason)
         self._planner.give_up()
 
     async def _fetch(self, request: GaitRequest, waiting_as: _Order | None) -> tuple[StreamedGait, str]:
@@ -214,6 +232,8 @@ class WalkCommands:
                 continue
             plan = await self._planner.plan(pace, goal, self._torque_limit)
             order.require_valid()
+            for need in staying:  # Limits may have been lowered meanwhile.
+                self.limits.require(need)
             leading = self._needed(f"to get to {goal.speed:.4f} m/s", *plan.steps)
             if self._stream.follow(plan, goal):
                 self._needs.add(self._stream.walk, goal.profile, PaceNeeds(staying, leading))
