@@ -29,8 +29,8 @@ FloatArray = NDArray[np.float64]
 
 # Optima whose objectives agree to this relative difference are taken for one.
 SAME_OPTIMUM = 1e-4
-# Barrier parameters for starts that meet the optimality conditions but for their contacts, and for
-# optima of another grid or of a neighbouring request.
+# Barrier parameters for starts that meet the optimality conditions but for their contacts, and for optima
+# of another grid, of a neighbouring request, or whose contacts have just moved.
 _NEAR = 1e-9
 _RESAMPLED = 1e-4
 # Rows of lambda_x+ and lambda_x- of each foot.
@@ -201,7 +201,7 @@ class Search:
         if self.session.stopped or np.array_equal(schedule, self._schedule(best)):
             return None
         guess = replace(relaxed, contacts=OWN_CONTACTS)
-        found = self._with_schedule(guess, schedule, "polish", self._from_barrier(_NEAR))
+        found = self._with_schedule(guess, schedule, "polish", self._from_barrier(_RESAMPLED))
         return found if found.solved else None
 
     def _schedule(self, candidate: Candidate) -> Schedule:
