@@ -108,10 +108,12 @@ class Starter:
         self._logs = logs
         self.nodes = []
 
-    def __call__(self, name, namespace="", **parameters):
+    def __call__(self, name, namespace="", remaps=None, **parameters):
         arguments = [part for key, value in parameters.items() for part in ("-p", f"{key}:={value}")]
         if namespace:
             arguments += ["-r", f"__ns:=/{namespace}"]
+        for old, new in (remaps or {}).items():
+            arguments += ["-r", f"{old}:={new}"]
         log = self._logs / f"{name}_{len(self.nodes)}.log"
         node = NodeProcess(name, log, arguments, os.environ)
         self.nodes.append(node)

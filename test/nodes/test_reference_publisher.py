@@ -1,6 +1,7 @@
 import itertools
 import math
 import signal
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ pytest.importorskip("rclpy")
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist, Vector3
 from nodes.conftest import FAST, SLOW
 from nodes.graph import SETTLING, assert_left_cleanly
 from rclpy.parameter import Parameter
@@ -318,6 +320,27 @@ def test_operators_are_told_why_nothing_is_streamed(graph, start):
     graph.spin_until(told_while_it_leaps, "a clock that leaps")
     graph.set_parameters(NODE, Parameter("streaming", value=False))
     graph.spin_until(lambda: told("nothing is streamed: the parameter `streaming` is false"), "the parameter")
+
+
+def test_operators_are_told_that_no_speed_can_be_walked(graph, start, stocked):
+    nowhere_known = 0.5
+    start(NODE, initial_speed=nowhere_known, remaps={"~/cmd_vel": "/robot/velocity"}, **PATIENT)
+    heard = graph.subscribe(DiagnosticArray, "/diagnostics")
+
+    def told(check, words):
+        found = [one for array in heard for one in array.status if one.name == f"{NODE}: {check}"]
+        return bool(found) and words in found[-1].message
+
+    graph.spin_until(lambda: told("library", "the library is not there"), "that the library is missing")
+    start("gait_library", **stocked)
+    graph.spin_until(lambda: told("library", "the library is there"), "that the library is there")
+    refused = "the last speed was refused: initial_speed: "
+    graph.spin_until(lambda: told("commands", refused), "the refusal")
+    velocity = graph.publisher(Twist, "/robot/velocity")
+    send = partial(velocity.publish, Twist(linear=Vector3(x=SLOW)))
+    graph.spin_until(lambda: send() or told("walk", "walks at 0.3185 m/s"), "the walk")
+    assert told("commands", "no speed is refused")
+    graph.spin_until(lambda: told("walk", "no speed on /robot/velocity for 0.5 s, send"), "the silence")
 
 
 def test_a_misspelt_parameter_is_told(graph, start):

@@ -85,16 +85,22 @@ def test_a_stream_of_speeds_that_falls_silent_ends_in_a_stand(graph, walker, joi
         return walker.states[-1].state == "walking" and walker.states[-1].speed == pytest.approx(FAST)
 
     graph.spin_until(walks, "the walk")
+    silent = f"no speed on {velocity.topic_name} for 0.5 s"
+    refused = "a velocity has linear.x=nan, allowed are finite numbers in all its parts"
+
+    def told(check, message):
+        found = findings(diagnostics, check)
+        return found and message in found[0].message and found[0].level == b"\x01"
+
     # Speeds that are refused don't keep the stream alive.
     graph.spin_until(lambda: send(math.nan) or walker.states[-1].state == "standing", "the stand")
-    assert "no speed on ~/cmd_vel for 0.5 s: coming to a stand" in publisher.output()
-
-    def told():
-        walk = findings(diagnostics, "walk")
-        return walk and "no speed on ~/cmd_vel for 0.5 s" in walk[0].message and walk[0].level == b"\x01"
-
-    graph.spin_until(told, "the diagnostics")
+    assert f"coming to a stand: {silent}" in publisher.output()
+    reason = f"{silent} that can be followed: {refused}"
+    graph.spin_until(lambda: send(math.nan) or told("walk", reason), "why it is refused")
+    assert told("commands", f"the last speed was refused: {refused}")
     graph.spin_until(walks, "the walk again")
+    graph.spin_until(lambda: told("walk", f"{silent}, send speeds again"), "the silence")
+    assert findings(diagnostics, "commands")[0].level == b"\x00"
 
 
 def test_parts_of_a_velocity_that_a_planar_walker_can_not_follow_are_ignored_and_told(
@@ -109,7 +115,8 @@ def test_parts_of_a_velocity_that_a_planar_walker_can_not_follow_are_ignored_and
 
     graph.spin_until(walks, "the walk")
     told = (
-        "~/cmd_vel: linear.y=0.25, angular.z=-0.5 ignored: the walker is planar, it can only follow linear.x"
+        f"{velocity.topic_name}: linear.y=0.25, angular.z=-0.5 ignored: the walker is planar, it can only "
+        "follow linear.x"
     )
     assert publisher.output().count(told) == 1
 

@@ -3,13 +3,14 @@
 from walk_optimizer.nodes.bag import StreamBag
 from walk_optimizer.nodes.diagnostics import Diagnostics, Finding, Level
 from walk_optimizer.nodes.joint_stream import JointStream
+from walk_optimizer.nodes.remote_service import RemoteService
 from walk_optimizer.nodes.speed_commands import SpeedCommands
 from walk_optimizer.nodes.walk_commands import WalkCommands
 from walk_optimizer.phase_clock import Motion
 from walk_optimizer.recording.disk import free_bytes
 from walk_optimizer.recording.status import RecorderStatus
 
-_CHECKS = ("walk", "timing", "recording")
+_CHECKS = ("walk", "commands", "library", "timing", "recording")
 _MILLISECONDS = 1e3
 _MEGABYTE = 1e6
 # A stream of 1 Hz is the slowest, in [s].
@@ -25,13 +26,15 @@ class PublisherHealth:
         stream: JointStream,
         commands: WalkCommands,
         speeds: SpeedCommands,
+        library: RemoteService,
         bag: StreamBag,
     ) -> None:
         """Add the checks to a node's."""
         self._diagnostics, self._stream, self._bag = diagnostics, stream, bag
-        self._commands, self._speeds = commands, speeds
+        self._commands, self._speeds, self._library = commands, speeds, library
         self._holds = 0
-        for name, check in zip(_CHECKS, (self._walk, self._timing, self._recording), strict=True):
+        checks = (self._walk, self._refusal, self._library_there, self._timing, self._recording)
+        for name, check in zip(_CHECKS, checks, strict=True):
             diagnostics.add(name, check)
 
     def close(self) -> None:
@@ -47,10 +50,27 @@ class PublisherHealth:
         values = {"state": report.state, "speed": report.speed, "target_speed": report.target_speed}
         if report.state == Motion.EMERGENCY_STOP.value:
             return Finding(Level.ERROR, text, values)
-        if self._speeds.watch.stale:
-            silence = f"no speed on ~/cmd_vel for {self._speeds.watch.timeout:g} s, send speeds again"
-            return Finding(Level.WARN, f"{silence}; {text}", values)
+        silence = self._speeds.silence
+        if silence:
+            return Finding(Level.WARN, f"{text}; {silence}", values)
         return Finding(Level.OK, text, values)
+
+    def _refusal(self) -> Finding:
+        refusal = self._commands.refusal
+        if refusal:
+            return Finding(Level.WARN, f"the last speed was refused: {refusal}")
+        return Finding(Level.OK, "no speed is refused")
+
+    def _library_there(self) -> Finding:
+        values = {"service": self._library.name}
+        if self._library.available:
+            return Finding(Level.OK, "the library is there", values)
+        return Finding(
+            Level.WARN,
+            "the library is not there: no other gait can be walked, stops work; start gait_library, or set "
+            "`library_service` to its service",
+            values,
+        )
 
     def _timing(self) -> Finding:
         punctuality = self._stream.punctuality()

@@ -65,7 +65,9 @@ class ReferencePublisherNode(ManagedNode):
         self._commands = WalkCommands(self, self._stream, planner, library, walker)
         self._speeds = SpeedCommands(self, self._commands)
         self._recording = RecordingControl(self, self._bag, self._stream)
-        health = PublisherHealth(self.diagnostics, self._stream, self._commands, self._speeds, self._bag)
+        health = PublisherHealth(
+            self.diagnostics, self._stream, self._commands, self._speeds, library, self._bag
+        )
         for end in (planner.close, health.close, self._recording.end, self._stream.stop):
             self._undo.callback(end)
         self.serve(SetGait, "~/set_gait", self._set_gait)
@@ -137,6 +139,7 @@ class ReferencePublisherNode(ManagedNode):
         except (SupersededError, NotActiveError):
             return
         except WalkOptimizerError as error:
+            self._commands.refusal = f"initial_speed: {error}"
             self.get_logger().error(f"initial_speed refused: {error}")
 
     async def _joint_trajectory(

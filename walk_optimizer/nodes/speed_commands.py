@@ -1,9 +1,12 @@
 """Speeds that come as topics: `~/target_speed`, sent once, and `~/cmd_vel`, a stream that must go on."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from geometry_msgs.msg import Twist
+from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_msgs.msg import Float64
 
@@ -63,14 +66,17 @@ class SpeedCommands:
         self._under_way = 0
         self._ignored = IgnoredParts()
         self._timer: Timer | None = None
-        for kind, topic, callback in (
-            (Float64, "~/target_speed", self._on_target_speed),
-            (Twist, "~/cmd_vel", self._on_twist),
-        ):
-            events = warn_of_publishers(node, topic, COMMAND)
-            node.create_subscription(
-                kind, topic, callback, COMMAND, callback_group=node.group, event_callbacks=events
-            )
+        self._subscribe(Float64, "~/target_speed", self._on_target_speed)
+        self._stream = self._subscribe(Twist, "~/cmd_vel", self._on_twist)
+
+    @property
+    def silence(self) -> str:
+        """What is wrong with a stream that has fallen silent, or is refused all the time; or empty."""
+        if not self.watch.stale:
+            return ""
+        text = f"no speed on {self._stream.topic_name} for {self.watch.timeout:g} s"
+        refusal = self._commands.refusal
+        return f"{text} that can be followed: {refusal}" if refusal else f"{text}, send speeds again"
 
     def forget(self) -> None:
         """Drop what was asked for: another command has come than by these topics."""
@@ -109,7 +115,7 @@ class SpeedCommands:
             return None
         warning = self._ignored.warning(message, time.monotonic())
         if warning is not None:
-            self._node.get_logger().warning(f"~/cmd_vel: {warning}")
+            self._node.get_logger().warning(f"{self._stream.topic_name}: {warning}")
         return self._target(speed)
 
     def _target(self, speed: float) -> _Target | None:
@@ -132,7 +138,7 @@ class SpeedCommands:
         if self._was_just_refused(target):
             return
         if target == self._current:
-            self._waiting = None
+            self._waiting, self._commands.refusal = None, ""
             return
         if target == _STAND:
             # A stop waits for nothing; what is being fetched then comes too late to count.
@@ -175,7 +181,18 @@ class SpeedCommands:
         refused, when = self._refused
         return target == refused and time.monotonic() - when < _REFUSAL_HOLDS
 
+    def _subscribe(self, kind: type, topic: str, callback: Callable[[Any], None]) -> Subscription:
+        return self._node.create_subscription(
+            kind,
+            topic,
+            callback,
+            COMMAND,
+            callback_group=self._node.group,
+            event_callbacks=warn_of_publishers(self._node, topic, COMMAND),
+        )
+
     def _tell_refusal(self, error: WalkOptimizerError) -> None:
+        self._commands.refusal = str(error)
         self._node.get_logger().warning(f"target speed refused: {error}", throttle_duration_sec=1.0)
 
     def _watch_no_more(self) -> None:
@@ -188,9 +205,7 @@ class SpeedCommands:
         """Stop the walk when a stream of speeds has fallen silent."""
         self.watch.timeout = self._node.parameters["command_timeout"]
         if self.watch.fell_silent(self._now()):
-            self._node.get_logger().warning(
-                f"no speed on ~/cmd_vel for {self.watch.timeout:g} s: coming to a stand"
-            )
+            self._node.get_logger().warning(f"coming to a stand: {self.silence}")
             self._take(_STAND, supersedes=True)
 
     def _now(self) -> float:

@@ -66,6 +66,11 @@ class WalkCommands:
 
     Owns which command counts, and what a gait must meet to be walked. Does not own where commands come
     from, nor the stream. Everything here runs in the node's executor.
+
+    Attributes:
+        limits: What the joints can do.
+        refusal: Why the last command was refused, of those that come as topics or parameters and so have no
+            answer; empty once one is carried out.
     """
 
     def __init__(
@@ -90,6 +95,7 @@ class WalkCommands:
         settings = transition_settings()
         self._standing = standing_pose(walker, settings.feet_distance, settings.knee_bend)
         self.limits = JointLimits()
+        self.refusal = ""
         self._order: _Order | None = None
 
     def begin(self) -> StandProfile:
@@ -101,6 +107,7 @@ class WalkCommands:
         stand = StandProfile(self._standing)
         standing = self._needed(_TO_STAND, stand)
         self._needs = WalkNeeds(stand, PaceNeeds((standing,)))
+        self.refusal = ""
         return stand
 
     @property
@@ -148,11 +155,13 @@ class WalkCommands:
         stop = await self._planner.plan(gait, stand, self._torque_limit)
         stopping = self._needed(f"to stop from {gait.speed:.4f} m/s", *stop.steps, stand)
         await self._lead_to(gait, order, (keeping, stopping))
+        self.refusal = ""
         return f"{gait} from the next step on; {source}"
 
     def stop(self) -> str:
         """Have the walk come to a stand, and return a sentence about it; it waits for nothing."""
         self.supersede()
+        self.refusal = ""
         pace = self._stream.pace
         while isinstance(pace, StreamedGait):
             stand = self._stand_after(pace)
