@@ -136,6 +136,12 @@ def test_pause_and_resume(graph, walker, joints):
     graph.spin_until(lambda: not any(joints[-1].velocity), "rest")
     held = len(joints)
     graph.spin_until(lambda: len(joints) > held + 20, "the hold")
+    assert (
+        "m/s (implicit_euler) from the next step on, once ~/resume is called; "
+        in walker.set_gait(SLOW).message
+    )
+    assert walker.trigger("stop") == "comes to a stand after the running step, once ~/resume is called"
+    assert walker.set_gait(FAST).success
     assert len({tuple(message.position) for message in joints[held:]}) == 1
     assert not any(any(message.velocity) or any(message.effort) for message in joints[held:])
     assert walker.trigger("resume") == "goes on"
@@ -153,13 +159,15 @@ def test_an_emergency_stop_is_latched(graph, walker, joints):
     assert not any(stopped.effort)
     refused = walker.set_gait(SLOW)
     assert (refused.success, "call ~/resume to release it" in refused.message) == (False, True)
+    assert walker.trigger("stop") == "comes to a stand after the running step, once ~/resume is called twice"
     assert "emergency stop, holds its pose already" in walker.trigger("pause")
     assert "released, and paused" in walker.trigger("resume")
     walker.wait_for("paused")
     graph.spin_for(0.3)
     assert list(joints[-1].position) == list(stopped.position)
     assert walker.trigger("resume") == "goes on"
-    walker.wait_for("walking", FAST)
+    walker.wait_for("standing")
+    assert walker.trigger("stop") == "stands already"
 
 
 def test_a_gait_beyond_the_limits_is_refused_and_the_walk_goes_on(graph, walker):

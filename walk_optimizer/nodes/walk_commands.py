@@ -24,6 +24,12 @@ from walk_optimizer.walk_needs import PaceNeeds, WalkNeeds
 # Before the library is up, it is tried again after this time in [s].
 _RETRY_PERIOD = 1.0
 _TO_STAND = "to stand"
+_STOPS = "comes to a stand after the running step"
+_ONCE_RESUMED = {
+    Motion.RUNNING: "",
+    Motion.PAUSED: ", once ~/resume is called",
+    Motion.EMERGENCY_STOP: ", once ~/resume is called twice",
+}
 
 
 class SupersededError(WalkOptimizerError):
@@ -156,7 +162,7 @@ class WalkCommands:
         stopping = self._needed(f"to stop from {gait.speed:.4f} m/s", *stop.steps, stand)
         await self._lead_to(gait, order, (keeping, stopping))
         self.refusal = ""
-        return f"{gait} from the next step on; {source}"
+        return f"{gait} from the next step on{self._once_resumed}; {source}"
 
     def stop(self) -> str:
         """Have the walk come to a stand, and return a sentence about it; it waits for nothing."""
@@ -170,10 +176,10 @@ class WalkCommands:
                 # Whatever they need: a stop is always possible.
                 needs = PaceNeeds((JointNeed.of(_TO_STAND, [stand]),), JointNeed.of("to stop", plan.steps))
                 self._needs.add(self._stream.walk, stand, needs)
-                return "comes to a stand after the running step"
+                return f"{_STOPS}{self._once_resumed}"
             pace = self._stream.pace
         self._stream.walk.stay(pace)
-        return "stands already, or is about to"
+        return f"{_STOPS}{self._once_resumed}" if self._stream.walk.is_changing else "stands already"
 
     def supersede(self) -> None:
         """End what is under way: another command counts from now on."""
@@ -261,6 +267,11 @@ class WalkCommands:
     def _stand_after(self, gait: StreamedGait) -> StandProfile:
         """Return the stand that a gait is stopped in: its knee springs stay as they are."""
         return StandProfile(self._standing.on(gait.spring))
+
+    @property
+    def _once_resumed(self) -> str:
+        """What has to happen before anything moves; empty for nothing."""
+        return _ONCE_RESUMED[self._stream.walk.clock.motion]
 
     @property
     def _torque_limit(self) -> float:
