@@ -9,6 +9,7 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from nodes.conftest import FAST, SLOW
 from nodes.graph import assert_left_cleanly
 from nodes.walking import NODE, Walker, assert_continuous
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from walk_optimizer_interfaces.srv import StartRecording
@@ -54,12 +55,17 @@ def test_a_manager_decides_when_references_are_streamed(graph, start, stocked, t
     joints.clear()
     graph.spin_for(0.3)
     assert not joints
-    # From the beginning: nobody knows where the robot has gone meanwhile.
+    # From the beginning, with what was set meanwhile: nobody knows where the robot has gone meanwhile.
     assert change(graph, Transition.TRANSITION_CLEANUP)
     assert change(graph, Transition.TRANSITION_CONFIGURE)
+    (answer,) = graph.set_parameters(NODE, Parameter("initial_speed", value=SLOW))
+    assert answer.successful
     assert change(graph, Transition.TRANSITION_ACTIVATE)
     graph.spin_until(lambda: joints, "the stand again")
     assert list(joints[0].position) == STANDING
+    walker.wait_for("walking", SLOW)
+    (answer,) = graph.set_parameters(NODE, Parameter("initial_speed", value=FAST))
+    assert (answer.successful, "it only counts when the node is activated" in answer.reason) == (False, True)
     assert_left_cleanly(node, node.stop())
 
 

@@ -57,7 +57,8 @@ SETTINGS = [
     Setting(
         "initial_speed",
         0.0,
-        "Walk at this speed from the start; 0 stands until a command comes [m/s].",
+        "Walk at this speed from activation on; 0 stands until a command comes. It can't be changed while the "
+        "node is active [m/s].",
         check=_check_speed,
     ),
     Setting(
@@ -219,6 +220,21 @@ def stream_format(parameters: NodeParameters) -> StreamFormat:
         command_interface=parameters["command_interface"],
         frame_id=parameters["frame_id"],
     )
+
+
+def require_no_late_start(parameters: NodeParameters, changes: Mapping[str, Any]) -> None:
+    """Refuse to change the speed at activation while a node is active.
+
+    It would do nothing now, and have the walker set off when nobody thinks of it any more.
+
+    Raises:
+        ConfigurationError: says what would do.
+    """
+    if changes.get("initial_speed", parameters["initial_speed"]) != parameters["initial_speed"]:
+        raise ConfigurationError(
+            "it only counts when the node is activated, and it is active; send the speed to ~/target_speed, "
+            "or deactivate the node before"
+        )
 
 
 RATE_SETTINGS = {"rate", "longest_gap"}

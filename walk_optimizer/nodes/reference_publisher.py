@@ -24,6 +24,7 @@ from walk_optimizer.nodes.publisher_settings import (
     RATE_SETTINGS,
     SETTINGS,
     joint_limits,
+    require_no_late_start,
     require_steady,
     stream_format,
 )
@@ -161,8 +162,10 @@ class ReferencePublisherNode(ManagedNode):
         try:
             if values.keys() & RATE_SETTINGS:
                 require_steady(self.parameters, values)
-            if values.keys() & LIMIT_SETTINGS and self.active:
-                self._commands.require_met(joint_limits(self.parameters, values))
+            if self.active:
+                require_no_late_start(self.parameters, values)
+                if values.keys() & LIMIT_SETTINGS:
+                    self._commands.require_met(joint_limits(self.parameters, values))
         except WalkOptimizerError as error:
             return SetParametersResult(successful=False, reason=f"{', '.join(values)}: {error}")
         return SetParametersResult(successful=True)
