@@ -77,6 +77,42 @@ def test_topics_are_picked_and_wrong_ones_refused(graph, bag):
     assert "played 1 messages on 1 topics" in player.communicate(timeout=60)[0]
 
 
+def test_a_topic_that_another_node_publishes_is_refused_unless_it_gets_another_name(graph, bag):
+    graph.node.create_publisher(JointState, JOINTS.name, 1)
+    player = play(bag, "--topics", JOINTS.name)
+    graph.spin_until(lambda: player.poll() is not None, "the refusal")
+    output = player.communicate()[0]
+    assert player.returncode == 2
+    assert f"published by others already: {JOINTS.name} by /test_client. Stop" in output
+    assert "Traceback" not in output
+    elsewhere = graph.subscribe(JointState, "/recorded/joints")
+    player = play(bag, "--remap", f"{JOINTS.name}:=/recorded/joints", "--delay", "5")
+    graph.spin_until(lambda: player.poll() is not None, "the player")
+    assert player.returncode == 0, player.communicate()[0]
+    assert len(elsewhere) == COUNT
+    for remap, words in (
+        ("/joints", "is no remap: give FROM:=TO"),
+        ("/joints:=/other", "/joints of '/joints:=/other' is not played; played are"),
+        (f"{JOINTS.name}:=no name", "'no name' is no name of a topic"),
+    ):
+        player = play(bag, "--remap", remap)
+        assert player.wait(60) == 2
+        assert words in player.communicate()[0]
+
+
+def test_diagnostics_beside_those_of_others_are_played_if_asked_for(graph, tmp_path):
+    diagnostics = topic("/diagnostics", "std_msgs/msg/String")
+    with BagWriter(tmp_path / "bag", RecorderSettings(min_free_bytes=0), topics=[diagnostics]) as writer:
+        writer.write(diagnostics.name, string("well"), START_NS)
+    graph.node.create_publisher(String, diagnostics.name, 1)
+    outcomes = []
+    for arguments in ((), ("--topics", diagnostics.name)):
+        player = play(tmp_path / "bag", *arguments)
+        graph.spin_until(lambda player=player: player.poll() is not None, "the player")
+        outcomes.append(player.returncode)
+    assert outcomes == [2, 0]
+
+
 def test_the_recorded_quality_of_service_is_offered_again():
     for qos in (STREAM, LATCHED):
         recorded = topic("/t", "std_msgs/msg/String", qos_profile(qos))

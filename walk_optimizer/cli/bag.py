@@ -28,13 +28,18 @@ publish the messages of a bag again, for machines without rosbag2
 
 On their topics, with the recorded quality of service and timing, and never in a burst:
 a player that was held up goes on with the recorded distances. Needs ROS. Stamps inside
-of messages stay as they were."""
+of messages stay as they were.
+
+A topic that another node publishes is refused: stop that node, play other topics, or
+under other names. /diagnostics and tf beside those of others are played if --topics
+names them."""
 
 _PLAY_EXAMPLES = """\
 examples:
   walk-optimizer bag play recordings/walk_1
   walk-optimizer bag play recordings/walk_1 --rate 0.5 --loop
-  walk-optimizer bag play recordings/walk_1 --topics /reference_publisher/joint_reference"""
+  walk-optimizer bag play recordings/walk_1 --topics /reference_publisher/joint_reference
+  walk-optimizer bag play recordings/walk_1 --topics /tf --remap /tf:=/recorded/tf"""
 
 
 def add_parser(verbs: Subparsers) -> None:
@@ -56,12 +61,15 @@ def add_parser(verbs: Subparsers) -> None:
     play.add_argument(
         "--delay",
         type=float,
-        default=1.0,
+        default=3.0,
         metavar="SECONDS",
-        help="time for subscribers to find the player (default: %(default)s)",
+        help="time for subscribers to find the player, 3 at the least (default: %(default)s)",
     )
     play.add_argument("--loop", action="store_true", help="begin anew at the end, until Ctrl-C")
     play.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these (default: all)")
+    play.add_argument(
+        "--remap", nargs="+", default=(), metavar="FROM:=TO", help="play topics under other names"
+    )
     play.set_defaults(run=run_play)
 
 
@@ -93,6 +101,6 @@ def run_play(args: argparse.Namespace) -> int:
         from walk_optimizer.nodes.bag_player import play_bag
     except ImportError as error:
         raise MissingDependencyError(f"playing a bag needs ROS 2: {error}") from error
-    played = play_bag(args.bag, info, args.delay, args.topics, args.rate, args.loop)
+    played = play_bag(args.bag, info, args.delay, args.topics, args.rate, args.loop, args.remap)
     print(f"played {played.messages} messages on {played.topics} topics")
     return 0

@@ -1,8 +1,8 @@
 """Plays bags through rclpy: the very bytes, on their topics, with the quality of service of the recording."""
 
 import time
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,17 +19,26 @@ from rclpy.qos import (
 )
 from rclpy.signals import SignalHandlerOptions
 
-from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.errors import InvalidRequestError, WalkOptimizerError
+from walk_optimizer.nodes.parameters import require_name
 from walk_optimizer.recording.info import BagInfo
-from walk_optimizer.recording.playback import messages_due, require_topics
+from walk_optimizer.recording.playback import messages_due, topic_names
 from walk_optimizer.recording.ros_messages import message_class
 from walk_optimizer.recording.topics import INFINITE_NS, QosProfile, TopicInfo
 
 # Longest wait for what is still under way at the end, in [s].
 _LAST_WORDS = 1.0
 _LONGEST_DELAY = 3600.0
+# Time to find out who else publishes, in [s]: it often takes 2 s and more. Their names come after that.
+_DISCOVERY, _NAME_DELAY = 3.0, 1.0
+# Topics that every node has, and those that several nodes may share, where somebody asks for that.
+_EVERYBODYS, _SHARED = ("/rosout", "/parameter_events"), ("diagnostics", "tf", "tf_static")
 # What a topic is given whose recording does not tell its history.
 _DEPTH = 10
+
+
+class TopicInUseError(WalkOptimizerError):
+    """Another node publishes what is to be played: its subscribers would get two streams in one."""
 
 
 @dataclass(frozen=True)
@@ -52,30 +61,41 @@ def play_bag(
     topics: Collection[str] | None = None,
     rate: float = 1.0,
     loop: bool = False,
+    remaps: Collection[str] = (),
 ) -> Playing:
     """Play a bag, to its end or until Ctrl-C.
 
     Args:
         path: The bag.
         info: What is in it.
-        delay: Time for subscribers to find the player, in [s].
+        delay: Time for subscribers to find the player, in [s]; the player looks around for 3 s at the
+            least.
         topics: Names of the topics wanted; all when None.
         rate: Time of the recording for each time of playing.
         loop: Whether to begin anew at the end.
+        remaps: Other names for topics, each as FROM:=TO.
 
     Raises:
-        InvalidRequestError: the bag lacks a topic, or rate or delay is out of range.
+        InvalidRequestError: the bag lacks a topic, a remap is none, or rate or delay is out of range.
+        TopicInUseError: somebody else publishes one of the topics.
+        ConfigurationError: another name is no name of a topic.
         MessageDefinitionError: a message type is not installed.
     """
-    require_topics(info, topics or ())
+    names = topic_names(info, topics, remaps)
+    for name in names.values():
+        require_name(name)
     if not 0 <= delay <= _LONGEST_DELAY:
         raise InvalidRequestError(f"delay is {delay:g} s, allowed is 0 to {_LONGEST_DELAY:g} s")
-    wanted = [topic for topic in info.topics if topics is None or topic.name in topics]
     messages = messages_due(path, topics, rate, loop)
     count = 0
     with _player() as node:
-        publishers = {topic.name: _publisher(node, topic) for topic in wanted}
-        time.sleep(delay)
+        publishers = {
+            topic.name: _publisher(node, topic, names[topic.name])
+            for topic in info.topics
+            if topic.name in names
+        }
+        time.sleep(max(delay, _DISCOVERY))
+        _require_alone(node, publishers.values(), asked_for=topics or ())
         for message, wait in messages:
             time.sleep(wait)
             publishers[message.topic.name].publish(message.data)
@@ -98,8 +118,40 @@ def _player() -> Iterator[Node]:
         rclpy.try_shutdown()
 
 
-def _publisher(node: Node, topic: TopicInfo) -> Publisher:
-    return node.create_publisher(message_class(topic.type_name), topic.name, qos_of(topic))
+def _publisher(node: Node, topic: TopicInfo, name: str) -> Publisher:
+    return node.create_publisher(message_class(topic.type_name), name, qos_of(topic))
+
+
+def _require_alone(node: Node, publishers: Iterable[Publisher], asked_for: Collection[str]) -> None:
+    """Refuse to play beside others: a walker can't follow two streams of references at once.
+
+    Raises:
+        TopicInUseError: names the topics, the nodes, and what to do.
+    """
+    looked_at = [
+        topic
+        for topic in (str(publisher.topic_name) for publisher in publishers)
+        if topic not in _EVERYBODYS and not (topic in asked_for and topic.rpartition("/")[2] in _SHARED)
+    ]
+    if not any(_others(node, topic) for topic in looked_at):
+        return
+    time.sleep(_NAME_DELAY)
+    used = [f"{topic} by {', '.join(others)}" for topic in looked_at if (others := _others(node, topic))]
+    if used:
+        raise TopicInUseError(
+            f"published by others already: {'; '.join(used)}. Stop these nodes, play other topics with "
+            "--topics, or under other names with --remap FROM:=TO"
+        )
+
+
+def _others(node: Node, topic: str) -> list[str]:
+    """Return the names of the nodes that publish a topic beside this one."""
+    found = node.get_publishers_info_by_topic(topic)
+    names = [f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found]
+    # Another player has the same name.
+    with suppress(ValueError):
+        names.remove(node.get_fully_qualified_name())
+    return names
 
 
 def qos_of(topic: TopicInfo) -> QoSProfile:

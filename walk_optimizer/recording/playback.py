@@ -63,6 +63,32 @@ def require_topics(info: BagInfo, topics: Collection[str]) -> None:
         raise InvalidRequestError(f"the bag has no topic {', '.join(unknown)}; it has {', '.join(known)}")
 
 
+def topic_names(
+    info: BagInfo, topics: Collection[str] | None, remaps: Collection[str] = ()
+) -> dict[str, str]:
+    """Return the topics that are played, each with the name that it is played under.
+
+    Args:
+        info: What is in the bag.
+        topics: Names of the topics wanted; all when None.
+        remaps: Other names for some of them, each as FROM:=TO.
+
+    Raises:
+        InvalidRequestError: the bag lacks a topic, or a remap is none.
+    """
+    require_topics(info, topics or ())
+    wanted = [topic.name for topic in info.topics if topics is None or topic.name in topics]
+    names = {name: name for name in wanted}
+    for remap in remaps:
+        name, mark, other = remap.partition(":=")
+        if not (mark and name and other):
+            raise InvalidRequestError(f"{remap!r} is no remap: give FROM:=TO, such as /tf:=/recorded/tf")
+        if name not in names:
+            raise InvalidRequestError(f"{name} of {remap!r} is not played; played are {', '.join(wanted)}")
+        names[name] = other
+    return names
+
+
 def messages_due(
     path: Path, topics: Collection[str] | None, rate: float, loop: bool
 ) -> Iterator[tuple[BagMessage, float]]:
