@@ -19,6 +19,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
+from std_srvs.srv import Trigger
 from walk_optimizer_interfaces.msg import Gait, WalkState
 from walk_optimizer_interfaces.srv import GetJointTrajectory, SetGait, StartRecording, StopRecording
 
@@ -167,6 +168,21 @@ def test_refusals_say_what_the_core_says(graph, publisher):
     walk(graph)
     answer = graph.call(GetJointTrajectory, f"{NODE}/joint_trajectory", rate=-5.0)
     assert (answer.success, "rate is -5 Hz" in answer.message) == (False, True)
+    answer = graph.call(GetJointTrajectory, f"{NODE}/joint_trajectory", rate=1001.0)
+    assert (answer.success, answer.message) == (False, "rate is 1001 Hz, allowed is 1 to 1000 Hz")
+
+
+def test_cycles_are_made_while_others_are_answered(graph, publisher):
+    walk(graph, FAST)
+    graph.client(Trigger, f"{NODE}/emergency_stop")
+    several = [graph.send(GetJointTrajectory, f"{NODE}/joint_trajectory", rate=1000.0) for _ in range(8)]
+    calls = 6
+    for _ in range(calls):
+        assert graph.call(Trigger, f"{NODE}/emergency_stop").success
+    # Otherwise each call would have waited for a cycle at least.
+    assert sum(answer.done() for answer in several) < calls - 2
+    answers = [graph.result(answer) for answer in several]
+    assert all(len(answer.trajectory.points) > 1000 for answer in answers)
 
 
 def test_the_cycle_is_what_a_trajectory_controller_takes(graph, publisher):

@@ -2,12 +2,53 @@
 
 import math
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 
 from builtin_interfaces.msg import Duration
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.nodes.conversions import doubles
-from walk_optimizer.references import JOINTS, Cycle
+from walk_optimizer.profile import StepProfile
+from walk_optimizer.references import JOINTS, Cycle, sample_cycle
+from walk_optimizer.solve.worker import BusyError
+
+# Controllers interpolate between the points. To send more of them would hold up the stream.
+_HIGHEST_RATE = 1000.0
+# A cycle takes a third of a second at the highest rate.
+_WAITING_LIMIT = 16
+
+
+class CycleMessages:
+    """Makes cycles in a thread, one after the other, so that the node answers others meanwhile."""
+
+    def __init__(self) -> None:
+        """Start the thread."""
+        self._thread = ThreadPoolExecutor(1, "cycles")
+        self._waiting: list[Future[JointTrajectory]] = []
+
+    def make(
+        self, profile: StepProfile, rate: float, joint_names: Sequence[str], effort: bool
+    ) -> "Future[JointTrajectory]":
+        """Return what will be the cycle of a gait, with so many points per second in [Hz].
+
+        Raises:
+            InvalidRequestError: the rate is too high.
+            BusyError: too many others wait.
+        """
+        if rate > _HIGHEST_RATE:
+            raise InvalidRequestError(f"rate is {rate:g} Hz, allowed is 1 to {_HIGHEST_RATE:g} Hz")
+        self._waiting = [future for future in self._waiting if not future.done()]
+        if len(self._waiting) >= _WAITING_LIMIT:
+            raise BusyError(f"busy: {len(self._waiting)} cycles are being made; ask again later")
+        names = tuple(joint_names)
+        future = self._thread.submit(lambda: cycle_to_message(sample_cycle(profile, rate), names, effort))
+        self._waiting.append(future)
+        return future
+
+    def close(self) -> None:
+        """End the thread after what it does now."""
+        self._thread.shutdown(wait=False, cancel_futures=True)
 
 
 def cycle_to_message(

@@ -57,8 +57,8 @@ SETTINGS = [
     Setting(
         "initial_speed",
         0.0,
-        "Walk at this speed from activation on; 0 stands until a command comes. It can't be changed while the "
-        "node is active [m/s].",
+        "Walk at this speed from activation on; 0 stands until a command comes. It can't be changed while "
+        "the node is active [m/s].",
         check=_check_speed,
     ),
     Setting(

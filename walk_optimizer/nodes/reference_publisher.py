@@ -14,7 +14,7 @@ from walk_optimizer_interfaces.srv import GetGait, GetJointTrajectory, SetGait
 from walk_optimizer.errors import ConfigurationError, GaitNotFoundError, WalkOptimizerError
 from walk_optimizer.joint_limits import JointLimitError
 from walk_optimizer.nodes.bag import StreamBag
-from walk_optimizer.nodes.cycle_message import cycle_to_message
+from walk_optimizer.nodes.cycle_message import CycleMessages
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.lifecycle import ManagedNode, NotActiveError
 from walk_optimizer.nodes.publisher_health import PublisherHealth
@@ -35,7 +35,6 @@ from walk_optimizer.nodes.transition_planner import TransitionPlanner
 from walk_optimizer.nodes.walk_commands import SupersededError, WalkCommands
 from walk_optimizer.nodes.walker_setting import walker_of
 from walk_optimizer.phase_clock import Motion
-from walk_optimizer.references import sample_cycle
 from walk_optimizer.request import GaitRequest
 
 # The executor may hold Python's lock for that long in [s], several times a tick; the usual is 5 ms.
@@ -63,13 +62,14 @@ class ReferencePublisherNode(ManagedNode):
         self._stream = JointStream(self, self._bag)
         library = self.connect(GetGait, self.parameters["library_service"])
         planner = TransitionPlanner(self)
+        self._cycles = CycleMessages()
         self._commands = WalkCommands(self, self._stream, planner, library, walker)
         self._speeds = SpeedCommands(self, self._commands)
         self._recording = RecordingControl(self, self._bag, self._stream)
         health = PublisherHealth(
             self.diagnostics, self._stream, self._commands, self._speeds, library, self._bag
         )
-        for end in (planner.close, health.close, self._recording.end, self._stream.stop):
+        for end in (planner.close, self._cycles.close, health.close, self._recording.end, self._stream.stop):
             self._undo.callback(end)
         self.serve(SetGait, "~/set_gait", self._set_gait)
         self.serve(GetJointTrajectory, "~/joint_trajectory", self._joint_trajectory)
@@ -150,11 +150,12 @@ class ReferencePublisherNode(ManagedNode):
         if gait is None:
             raise GaitNotFoundError("no gait is streamed yet; call set_gait first")
         rate = request.rate if request.rate != 0 else self.parameters["rate"]
-        cycle = sample_cycle(gait.profile, rate)
-        response.trajectory = cycle_to_message(
-            cycle, self.parameters["joint_names"], self.parameters["trajectory_effort"]
+        cycle = self._cycles.make(
+            gait.profile, rate, self.parameters["joint_names"], self.parameters["trajectory_effort"]
         )
-        response.message = f"{gait}, two steps of it in {cycle.time.size} points"
+        await self.finished(cycle)
+        response.trajectory = cycle.result()
+        response.message = f"{gait}, two steps of it in {len(response.trajectory.points)} points"
 
     def _check_together(self, changes: list[Parameter]) -> SetParametersResult:
         """Refuse values that don't fit others, or limits that what is walked now does not meet."""
