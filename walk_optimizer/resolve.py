@@ -5,6 +5,7 @@ few iterations, and for the mesh to be fine enough: it is divided only if the ce
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from walk_optimizer.model.parameters import KneeSpring
 from walk_optimizer.refinement import RefinedSolves, certified_refinement
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
+from walk_optimizer.transcription.layout import P
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
 from walk_optimizer.transcription.phases import phases_of
 
@@ -44,7 +46,7 @@ def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSess
     guesses = [
         resampled(one.trajectory, one.spring, old, mesh) for one, old in zip(refined, meshes, strict=True)
     ]
-    guess = _between(guesses[0], guesses[-1], _share(request, neighbours))
+    guess = _at_pace(_between(guesses[0], guesses[-1], _share(request, neighbours)), request.step_time)
     walker = neighbours[0].walker
     solves = RefinedSolves(request, walker, session)
     solution = solves.solved(mesh, guess)
@@ -81,6 +83,16 @@ def _share(request: GaitRequest, neighbours: Sequence[Gait]) -> float:
     """Return where the new speed lies between two: 0 at the first, 1 at the second."""
     first, last = neighbours[0].request.speed, neighbours[-1].request.speed
     return 0.0 if first == last else float(np.clip((request.speed - first) / (last - first), 0.0, 1.0))
+
+
+def _at_pace(points: RefinedPoints, step_time: float) -> RefinedPoints:
+    """Return the same path walked in another time in [s]: momenta belong to the new velocities."""
+    quicker = float(points.durations.sum()) / step_time
+    states = points.states.copy()
+    states[:, :, P] *= quicker
+    return replace(
+        points, states=states, durations=points.durations / quicker, impulses=points.impulses * quicker
+    )
 
 
 def _between(first: RefinedPoints, second: RefinedPoints, share: float) -> RefinedPoints:

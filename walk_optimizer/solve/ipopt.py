@@ -90,6 +90,9 @@ def _strategy(barrier: float | None) -> dict[str, Any]:
         # with the first iteration, better than from least squares with the others.
         "bound_mult_init_method": "mu-based",
         "constr_mult_init_max": 0.0,
+        # A second right-hand side per factorisation, for the error of the first step in the products of
+        # bounds and multipliers [Mehrotra1992]: a seventh fewer iterations.
+        "corrector_type": "affine",
     }
 
 
