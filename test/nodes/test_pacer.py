@@ -47,6 +47,35 @@ def test_a_tick_is_made_up_for_only_where_it_is_little_late(began, ended, follow
     assert schedule.next_number(5, *times) == following
 
 
+class MadeUpTime:
+    """Time that only passes where somebody sleeps or works."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def monotonic(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.now += seconds
+
+
+def test_ticks_do_not_drift_however_long_they_take(monkeypatch):
+    clock, times, enough = MadeUpTime(), [], threading.Event()
+    monkeypatch.setattr("walk_optimizer.nodes.pacer.time", clock)
+
+    def tick():
+        times.append(clock.now)
+        clock.sleep(PERIOD / 5)
+        if len(times) == 1000:
+            enough.set()
+
+    pacer = Pacer(PERIOD, tick)
+    assert enough.wait(60)
+    pacer.stop()
+    assert times[:1000] == pytest.approx([100.0 + number * PERIOD for number in range(1000)], abs=1e-9)
+
+
 def test_stop_waits_for_the_last_tick():
     ticked = threading.Event()
     pacer = Pacer(0.001, ticked.set)

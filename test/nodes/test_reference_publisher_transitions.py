@@ -16,7 +16,7 @@ SLOW_TABLE, FASTER_TABLE = 0.25 / 0.785, 0.30 / 0.72
 
 def test_it_starts_speeds_up_and_stops_by_certified_steps(graph, start, tmp_path):
     start("gait_library", cache_folder=tmp_path)
-    start(NODE, cache_folder=tmp_path, rate=200.0, longest_gap=10.0)
+    publisher = start(NODE, cache_folder=tmp_path, rate=200.0, longest_gap=10.0)
     walker = Walker(graph)
     walker.wait_for("standing")
     joints = walker.listen(JointState, "joint_reference")
@@ -35,6 +35,8 @@ def test_it_starts_speeds_up_and_stops_by_certified_steps(graph, start, tmp_path
     assert seconds > 1.2
     assert stamp_ns(joints[-1]) > stamp_ns(joints[0])
     assert np.abs([joint.effort for joint in joints]).max() < 30
+    # The steps that stop a gait are known before it is begun.
+    assert "blends, to stop at once" not in publisher.output()
 
 
 def test_what_has_no_certified_steps_is_refused_and_the_stand_goes_on(graph, start, other_walker, tmp_path):

@@ -1,7 +1,6 @@
 """What tests of the publisher have in common: commands, and waiting for what they lead to."""
 
-from itertools import pairwise
-
+import numpy as np
 from nodes.graph import SETTLING
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
@@ -13,6 +12,10 @@ from walk_optimizer.nodes.qos import LATCHED
 MODE = "stiffness_and_equilibrium"
 NODE = "reference_publisher"
 ALL = QoSProfile(depth=20_000)
+# Between two references of 100 Hz a joint is up to 0.04 rad/s faster than at both; more at a lower rate.
+MARGIN = 0.5
+# References that are further apart than this in [s], and what no joint exceeds between them in [rad/s].
+STALL, FASTEST = 0.03, 40.0
 
 
 class Walker:
@@ -61,10 +64,13 @@ def stamp_ns(message):
     return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
 
 
-def assert_continuous(joints, fastest=40.0):
-    """Assert that no position jumps; velocities are bounded, so position changes are."""
-    for before, after in pairwise(joints):
-        elapsed = (stamp_ns(after) - stamp_ns(before)) * 1e-9
-        assert elapsed > 0
-        moved = max(abs(a - b) for a, b in zip(after.position, before.position, strict=True))
-        assert moved <= fastest * elapsed + 1e-9
+def assert_continuous(joints):
+    """Assert that no joint moves further than its velocities allow."""
+    velocities = np.abs([message.velocity for message in joints])
+    moved = np.abs(np.diff([message.position for message in joints], axis=0))
+    elapsed = np.diff([stamp_ns(message) for message in joints]) * 1e-9
+    assert np.all(elapsed > 0)
+    at_ends = np.maximum(velocities[:-1], velocities[1:])
+    # A test machine may stall for long: then the ends say nothing about what was between.
+    fastest = np.where(elapsed[:, None] < STALL, at_ends + MARGIN, FASTEST)
+    assert np.all(moved <= fastest * elapsed[:, None])
