@@ -10,10 +10,16 @@ import pytest
 pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Twist, Vector3
+from nodes.graph import SETTLING
 from nodes.walking import NODE
 from rcl_interfaces.msg import Log
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosDurability
+from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 from walk_optimizer_interfaces.msg import WalkState
 from walk_optimizer_interfaces.srv import StartRecording, StopRecording
@@ -215,3 +221,26 @@ def test_after_a_full_disk_another_folder_is_recorded_to(graph, publisher, tmp_p
     assert graph.call(StopRecording, STOP).success
     (bag,) = (tmp_path / "other").iterdir()
     assert describe_bag(bag).is_whole
+
+
+def test_commands_are_recorded_as_the_node_got_them_refused_ones_too(graph, publisher, tmp_path):
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    speeds = graph.publisher(Float64, f"{NODE}/target_speed", latched)
+    velocities = graph.publisher(Twist, f"{NODE}/cmd_vel")
+    graph.spin_for(SETTLING)
+    speeds.publish(Float64(data=0.0))  # Before the bag.
+    graph.spin_for(SETTLING)
+    for bag, sent in (("first", [99.0]), ("second", [-3.0, 0.0])):
+        assert graph.call(StartRecording, START, directory=str(tmp_path / bag)).success
+        for speed in sent:
+            speeds.publish(Float64(data=speed))
+            velocities.publish(Twist(linear=Vector3(x=speed)))
+            graph.spin_for(SETTLING)
+        assert graph.call(StopRecording, STOP).success
+        with AnyReader([tmp_path / bag]) as reader:
+            read = [(one.topic, reader.deserialize(data, one.msgtype)) for one, _, data in reader.messages()]
+            profiles = {one.topic: one.ext.offered_qos_profiles[0] for one in reader.connections}
+        assert [one.data for topic, one in read if topic == f"/{NODE}/target_speed"] == sent
+        assert [one.linear.x for topic, one in read if topic == f"/{NODE}/cmd_vel"] == sent
+        assert profiles[f"/{NODE}/target_speed"].durability is QosDurability.TRANSIENT_LOCAL
+        assert profiles[f"/{NODE}/cmd_vel"].durability is QosDurability.VOLATILE

@@ -10,11 +10,12 @@ pytest.importorskip("rclpy")
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist, Vector3
+from geometry_msgs.msg import TransformStamped, Twist, Vector3
 from nodes.conftest import FAST, SLOW
 from nodes.graph import SETTLING, assert_left_cleanly
 from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosDurability
 from rosbags.typesys import Stores, get_typestore
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -28,6 +29,7 @@ from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.qos import LATCHED
 from walk_optimizer.nodes.streamed_gait import StreamedGait
+from walk_optimizer.recording import describe_bag
 from walk_optimizer.reference_check import CycleMatcher
 from walk_optimizer.references import JOINTS
 from walk_optimizer.request import GaitRequest
@@ -216,6 +218,32 @@ def read_bag(directory):
 
 def values(message):
     return [list(getattr(message, name)) for name in ("name", "position", "velocity", "effort")]
+
+
+def test_the_bag_holds_what_the_other_nodes_publish(graph, publisher, start, tmp_path):
+    """Those of the default `recording_topics`, each with what it says and its quality of service."""
+    messages = pytest.importorskip("tf2_msgs.msg")
+    start("walker_visualizer")
+    fixed = graph.node.create_publisher(messages.TFMessage, "/tf_static", LATCHED)
+    fixed.publish(messages.TFMessage(transforms=[TransformStamped(child_frame_id="camera")]))
+    assert graph.call(StartRecording, f"{NODE}/start_recording", directory=str(tmp_path / "bag")).success
+    latched = {"/robot_description", "/tf_static", "/gait_library/table"}
+    others = latched | {"/tf", "/walker_visualizer/markers", "/diagnostics"}
+    # What is flushed can be read while the bag is being recorded.
+    graph.spin_until(lambda: others <= describe_bag(tmp_path / "bag").counts.keys(), f"all of {others}")
+    assert graph.call(StopRecording, f"{NODE}/stop_recording").success
+    bag = read_bag(tmp_path / "bag")
+    (description,) = bag["/robot_description"]
+    assert "<robot" in description.data
+    assert "base_link" in {one.child_frame_id for message in bag["/tf"] for one in message.transforms}
+    assert [one.child_frame_id for message in bag["/tf_static"] for one in message.transforms] == ["camera"]
+    assert any(message.markers for message in bag["/walker_visualizer/markers"])
+    (table, *_) = bag["/gait_library/table"]
+    assert len(table.gaits) == 2
+    with AnyReader([tmp_path / "bag"]) as reader:
+        offered = {one.topic: one.ext.offered_qos_profiles[0].durability for one in reader.connections}
+    kept = {name for name in others if offered[name] is QosDurability.TRANSIENT_LOCAL}
+    assert kept == latched
 
 
 def test_the_bag_holds_what_was_streamed(graph, publisher, tmp_path):

@@ -10,10 +10,12 @@ import pytest
 pytest.importorskip("rclpy")
 pytest.importorskip("tf2_msgs")
 
-from nodes.graph import PATIENCE
+from geometry_msgs.msg import Twist
+from nodes.graph import PATIENCE, SETTLING
 from rclpy.action import get_action_server_names_and_types_by_node
 from rclpy.node import Node
 from security.policies import enclaves
+from std_msgs.msg import Float64
 from tf2_msgs.msg import TFMessage
 from walk_optimizer_interfaces.srv import StopRecording
 
@@ -87,6 +89,10 @@ def test_a_node_may_do_exactly_what_it_does(graph, nodes, name):
 def test_the_bag_player_may_do_exactly_what_playing_takes(graph, nodes):
     transforms = graph.node.create_publisher(TFMessage, "/tf_static", 1)
     graph.spin_until(transforms.get_subscription_count, "a recording of /tf_static")
+    # Commands are in a bag when some have come; simulated time stands still, so nobody walks.
+    for kind, name in ((Float64, "target_speed"), (Twist, "cmd_vel")):
+        graph.publisher(kind, f"reference_publisher/{name}").publish(kind())
+    graph.spin_for(SETTLING)
     bag = graph.call(StopRecording, "reference_publisher/stop_recording").directory
     command = [sys.executable, "-m", "walk_optimizer.cli.main", "bag", "play", bag, "--delay", str(PATIENCE)]
     player = subprocess.Popen(command, stdout=subprocess.DEVNULL)

@@ -1,12 +1,14 @@
-"""Publishers whose messages also go into a bag while one is being recorded."""
+"""Topics of a node whose messages also go into a bag while one is being recorded."""
 
 import os
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 
 from walk_optimizer.nodes.qos_warnings import warn_of_subscribers
 from walk_optimizer.nodes.suite_node import SuiteNode
@@ -18,7 +20,7 @@ from walk_optimizer.recording.errors import (
     RecordingError,
 )
 from walk_optimizer.recording.recorder import RecorderLog
-from walk_optimizer.recording.ros_messages import serialize, topic_info
+from walk_optimizer.recording.ros_messages import qos_profile, serialize, topic_info
 from walk_optimizer.recording.status import RecorderStatus
 
 
@@ -70,6 +72,38 @@ class RecordedTopic:
         data = serialize(message)
         self._publisher.publish(data)
         recorder.write(self.info.name, data, max(time_ns, 0))
+
+
+class ReceivedTopic:
+    """A subscription whose messages also go into the bag: exactly those that the node was given.
+
+    A second subscription would not do: who publishes once may not have found it yet.
+    """
+
+    def __init__(self, node: SuiteNode, subscription: Subscription, bag: "StreamBag") -> None:
+        """Listen to what the subscription's callback is given."""
+        self._node, self._bag = node, bag
+        self._info = topic_info(subscription.topic_name, subscription.msg_type, subscription.qos_profile)
+        self._announced_to: Recorder | None = None
+        self._deliver = subscription.callback
+        subscription.callback = self._take
+
+    def _take(self, message: Any) -> None:
+        self._deliver(message)
+        recorder = self._bag.recorder
+        if recorder is None:
+            return
+        if recorder is not self._announced_to:
+            recorder.add_topic(self._offered())
+            self._announced_to = recorder
+        now = self._node.get_clock().now().nanoseconds
+        recorder.write(self._info.name, serialize(message), max(now, 0))
+
+    def _offered(self) -> TopicInfo:
+        """Return the topic with what its publishers offer; if they have gone, with what is asked of them."""
+        publishers = self._node.get_publishers_info_by_topic(self._info.name)
+        offered = tuple(qos_profile(publisher.qos_profile) for publisher in publishers)
+        return replace(self._info, qos=offered or self._info.qos)
 
 
 class StreamBag:

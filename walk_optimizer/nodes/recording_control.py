@@ -9,7 +9,7 @@ from typing import TypeVar
 from rclpy.parameter import Parameter
 from walk_optimizer_interfaces.srv import StartRecording, StopRecording
 
-from walk_optimizer.nodes.bag import StreamBag, named_folder, new_bag_folder
+from walk_optimizer.nodes.bag import ReceivedTopic, StreamBag, named_folder, new_bag_folder
 from walk_optimizer.nodes.foreign_topics import ForeignTopics
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.lifecycle import ManagedNode, NotActiveError
@@ -17,6 +17,8 @@ from walk_optimizer.nodes.publisher_settings import recorder_settings
 from walk_optimizer.recording.errors import AlreadyRecordingError, NotRecordingError, RecordingError
 from walk_optimizer.recording.status import RecorderStatus
 
+# What a post-mortem looks at first: which speeds came.
+_COMMANDS = ("~/target_speed", "~/cmd_vel")
 _Result = TypeVar("_Result")
 
 
@@ -52,7 +54,7 @@ class RecordingControl:
         """Offer the services.
 
         Args:
-            node: That offers them.
+            node: That offers them; it listens to its commands already.
             bag: That records.
             stream: That is recorded.
         """
@@ -61,6 +63,10 @@ class RecordingControl:
         self._showing = False
         self._thread = ThreadPoolExecutor(1, "bags")
         self._log = _NodeLog(node, self._show)
+        commands = {str(node.resolve_topic_name(name)) for name in _COMMANDS}
+        for subscription in node.subscriptions:
+            if subscription.topic_name in commands:
+                ReceivedTopic(node, subscription, bag)
         node.serve(StartRecording, "~/start_recording", self._start)
         node.serve(StopRecording, "~/stop_recording", self._stop)
 
