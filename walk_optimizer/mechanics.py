@@ -5,6 +5,7 @@ code: a check must not share the mistakes of what it checks.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,10 @@ from numpy.typing import NDArray
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 
 FloatArray = NDArray[np.float64]
+
+
+# Length, angle (N,) and slope (6,) of a straight piece.
+Piece = tuple[float, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,28 +27,40 @@ class Arm:
     l (sin a, -cos a): first derivative l (cos a, sin a) s, second l (-sin a, cos a) s s'.
 
     Attributes:
-        position: (2, N).
-        jacobian: (N, 2, 6).
-        hessian: (N, 2, 6, 6).
+        hip: Where it begins, (2, N).
+        pieces: The chain.
     """
 
-    position: FloatArray
-    jacobian: FloatArray
-    hessian: FloatArray
+    hip: FloatArray
+    pieces: tuple[Piece, ...]
+
+    @cached_property
+    def position(self) -> FloatArray:
+        """Where it ends, (2, N)."""
+        return self.hip + sum((length * _along(angle) for length, angle, _ in self.pieces), np.zeros((2, 1)))
+
+    @cached_property
+    def jacobian(self) -> FloatArray:
+        """Derivative of the position by q, (N, 2, 6)."""
+        jacobian = np.zeros((self.hip.shape[1], 2, 6))
+        jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
+        for length, angle, slope in self.pieces:
+            across = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+            jacobian += length * across[:, :, None] * slope
+        return jacobian
+
+    @cached_property
+    def hessian(self) -> FloatArray:
+        """Second derivative of the position by q, (N, 2, 6, 6)."""
+        hessian = np.zeros((self.hip.shape[1], 2, 6, 6))
+        for length, angle, slope in self.pieces:
+            hessian -= length * _along(angle).T[:, :, None, None] * np.outer(slope, slope)
+        return hessian
 
 
-def _arm(q: FloatArray, pieces: list[tuple[float, FloatArray, FloatArray]]) -> Arm:
-    """Return the chain of (length, angle (N,), slope (6,)) from the hip, q being (6, N)."""
-    count = q.shape[1]
-    position = q[:2].copy()
-    jacobian, hessian = np.zeros((count, 2, 6)), np.zeros((count, 2, 6, 6))
-    jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
-    for length, angle, slope in pieces:
-        along, across = np.array([np.sin(angle), -np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])
-        position += length * along
-        jacobian += length * across.T[:, :, None] * slope
-        hessian += -length * along.T[:, :, None, None] * np.outer(slope, slope)
-    return Arm(position, jacobian, hessian)
+def _along(angle: FloatArray) -> FloatArray:
+    """Return the unit vectors (2, N) at angles from the downward vertical."""
+    return np.array([np.sin(angle), -np.cos(angle)])
 
 
 def _leg(walker: WalkerParameters, q: FloatArray, leg: int) -> tuple[Arm, Arm, Arm]:
@@ -53,10 +70,11 @@ def _leg(walker: WalkerParameters, q: FloatArray, leg: int) -> tuple[Arm, Arm, A
     upper_slope[upper_row] = lower_slope[upper_row] = lower_slope[knee_row] = 1.0
     upper, lower = q[upper_row], q[upper_row] + q[knee_row] - np.pi
     thigh, shank = walker.upper_leg_length, walker.lower_leg_length
+    whole, hip = (thigh, upper, upper_slope), q[:2]
     return (
-        _arm(q, [(thigh / 2, upper, upper_slope)]),
-        _arm(q, [(thigh, upper, upper_slope), (shank / 2, lower, lower_slope)]),
-        _arm(q, [(thigh, upper, upper_slope), (shank, lower, lower_slope)]),
+        Arm(hip, ((thigh / 2, upper, upper_slope),)),
+        Arm(hip, (whole, (shank / 2, lower, lower_slope))),
+        Arm(hip, (whole, (shank, lower, lower_slope))),
     )
 
 
@@ -102,7 +120,7 @@ class Mechanics:
 def mechanics_at(walker: WalkerParameters, spring: KneeSpring, q: FloatArray, p: FloatArray) -> Mechanics:
     """Evaluate qdot = M^-1 p and -dH/dq, both (6, N)."""
     legs = [_leg(walker, q, leg) for leg in range(2)]
-    masses = [(walker.hip_mass, _arm(q, []))]
+    masses = [(walker.hip_mass, Arm(q[:2], ()))]
     for upper, lower, _ in legs:
         masses += [(walker.upper_leg_mass, upper), (walker.lower_leg_mass, lower)]
     matrix = sum(mass * np.einsum("nai,naj->nij", arm.jacobian, arm.jacobian) for mass, arm in masses)

@@ -191,8 +191,7 @@ def excess_between(
         step_length: Of the request, in [m].
         trajectory: The refined step.
     """
-    pairs = ((index, place) for index in range(trajectory.intervals) for place in _PLACES_BETWEEN)
-    between = np.array([trajectory.state(*pair) for pair in pairs]).T
+    between = trajectory.states_at(_PLACES_BETWEEN).reshape(-1, 12).T
     feet = (foot_arm(walker, between[:6], leg).position for leg in range(2))
     dips = np.array([-walker.terrain.gap(foot, step_length) for foot in feet]).max(axis=0)
     shape = (trajectory.intervals, _PLACES_BETWEEN.size)

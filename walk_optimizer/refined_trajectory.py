@@ -91,6 +91,13 @@ class RefinedTrajectory:
         values: FloatArray = place ** np.arange(4) @ self._state_polynomials[index]
         return values
 
+    def states_at(self, places: FloatArray) -> FloatArray:
+        """Return q and p at the same m places of all intervals, (n, m, 12)."""
+        values: FloatArray = np.einsum(
+            "mk,nks->nms", places[:, None] ** np.arange(4), self._state_polynomials
+        )
+        return values
+
     def state_rate(self, index: int, place: float) -> FloatArray:
         """Return the time derivative of the state polynomial, (12,)."""
         powers = np.array([0.0, 1.0, 2 * place, 3 * place**2])

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from walk_optimizer.contact.schedule import FootMode
 from walk_optimizer.mechanics import mechanics_at
 from walk_optimizer.model import dynamics, ground
+from walk_optimizer.model.linear import solved
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.refined_trajectory import RefinedTrajectory
@@ -47,9 +48,9 @@ def _rate_functions(modes: Modes) -> list[ca.Function]:
     if held:
         jacobian = ca.vertcat(*(rows for rows, _ in held))
         directions = ca.horzcat(*(columns for _, columns in held))
-        inertial = ca.solve(matrix, force - ca.mtimes(ca.jtimes(matrix, q, v), v))
+        inertial = solved(matrix, force - ca.mtimes(ca.jtimes(matrix, q, v), v))
         drift = ca.mtimes(ca.jtimes(jacobian, q, v), v)
-        effective = ca.mtimes(jacobian, ca.solve(matrix, directions))
+        effective = ca.mtimes(jacobian, solved(matrix, directions))
         reaction = ca.solve(effective, -ca.mtimes(jacobian, inertial) - drift)
         rate = force + ca.mtimes(directions, reaction)
     inner = ca.Function("inner", [q, v, u, spring, walker.symbols], [rate])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from walk_optimizer.model import dynamics
 from walk_optimizer.model.kinematics import RELABELLED, foot_position, mass_positions
+from walk_optimizer.model.linear import solved
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.simulation.settings import KneeStop
@@ -54,7 +55,7 @@ class _Symbols:
         torque = ca.DM(dynamics.INPUT_MAP[2:]) @ self.u + self.hip_jacobian[0, :].T * self.push
         torque += self._stop_torque()
         force = ca.gradient(self.kinetic - self.potential, self.theta)
-        return _solve(matrix, force - momentum_drift + torque)
+        return solved(matrix, force - momentum_drift + torque)
 
     def _stop_torque(self) -> ca.SX:
         """Return the torque -k d (1 + c dd), never forward, of a knee bent d backward [Hunt1975]."""
@@ -88,16 +89,11 @@ class _Symbols:
         landing = ca.substitute(dynamics.foot_jacobian(self.walker, free, 1), free, self.q)
         matrix = ca.substitute(dynamics.mass_matrix(self.walker, free), free, self.q)
         before = ca.jtimes(self.q, self.theta, self.omega)
-        give = _solve(matrix, landing.T)
-        impulse = -_solve(landing @ give, landing @ before)
+        give = solved(matrix, landing.T)
+        impulse = -solved(landing @ give, landing @ before)
         after = before + give @ impulse
         state = ca.vertcat(self.theta[_RELABELLED_ANGLES], after[2:][_RELABELLED_ANGLES])
         return state, impulse
-
-
-def _solve(matrix: ca.SX, right: ca.SX) -> ca.SX:
-    """Return matrix^-1 right of a symmetric positive matrix, in a tenth of a general solve's operations."""
-    return ca.ldl_solve(right, *ca.ldl(matrix))
 
 
 @cache
