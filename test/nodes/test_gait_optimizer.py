@@ -2,6 +2,7 @@ import os
 import signal
 import time
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
@@ -151,30 +152,35 @@ def test_a_goal_hears_of_its_solve_every_second_and_how_much_time_is_left(graph,
     assert behind.result()[0] == GoalStatus.STATUS_CANCELED
 
 
-def test_timers_of_the_node_keep_their_rate_during_a_solve(graph, isolated_graph):
+def test_timers_of_the_node_are_on_time_during_a_solve(graph, isolated_graph):
     """In one process with the node: the same timer, with and without a solve, in the same run."""
     node = GaitOptimizerNode()
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     ticks = []
-    node.create_timer(0.01, lambda: ticks.append(1))
+    node.create_timer(0.01, lambda: ticks.append(time.monotonic()))
 
-    def ticks_in(seconds):
+    def intervals():
+        """Median and 90th percentile of the times between two ticks in [s], over 2 s."""
         ticks.clear()
-        end = time.monotonic() + seconds
+        end = time.monotonic() + 2.0
         while time.monotonic() < end:
             executor.spin_once(timeout_sec=0.01)
-        return len(ticks)
+        return np.percentile(np.diff(ticks), [50, 90])
 
     try:
-        ticks_in(1.0)
-        idle = ticks_in(2.0)
+        intervals()
+        idle = intervals()
         job = GaitJob(GaitRequest.for_speed(**ENDLESS), WalkerParameters.from_yaml(), 60.0)
         ticket = submit_gait(node._pool, job)
         node.later(node.finished, ticket.future)
         while ticket.progress.iteration == 0:
             executor.spin_once(timeout_sec=0.01)
-        assert ticks_in(2.0) > idle / 2
+        busy = intervals()
+        assert not ticket.future.done()
+        # A machine that is busy otherwise is so in both; half of the ticks lost would be a median of 20 ms.
+        assert busy[0] < 1.5 * idle[0]
+        assert busy[1] < max(0.02, 2 * idle[1])
         ticket.cancel()
     finally:
         node.close()
@@ -189,6 +195,10 @@ def test_diagnostics_tell_of_workers_queue_and_the_last_outcome(graph, own_optim
     def finding(check):
         statuses = [one for array in heard for one in array.status if one.name == f"{name}: {check}"]
         return statuses[-1] if statuses else None
+
+    def own_stamps():
+        stamps = [one.header.stamp for one in heard if one.status[0].name.startswith(name)]
+        return [stamp.sec + stamp.nanosec * 1e-9 for stamp in stamps]
 
     def wait_for(check, words, level):
         graph.spin_until(lambda: (one := finding(check)) and words in one.message, f"{check}: {words}")
@@ -207,8 +217,9 @@ def test_diagnostics_tell_of_workers_queue_and_the_last_outcome(graph, own_optim
     os.kill(worker, signal.SIGKILL)
     values = wait_for("solves", "the worker process ended before it answered", DiagnosticStatus.WARN)
     assert (values["failed"], values["last_status"]) == ("1", "worker_lost")
-    times = [array.header.stamp.sec for array in heard]
-    assert len(times) >= (times[-1] - times[0]) / 2
+    graph.spin_until(lambda: len(own_stamps()) >= 6, "diagnostics of 5 s")
+    # A stalled machine may delay some of them, and those after these come sooner.
+    assert np.median(np.diff(own_stamps())) == pytest.approx(1.0, abs=0.1)
 
 
 def test_two_clients_share_a_solve_and_a_killed_worker_is_told_to_both(graph, optimizer):
