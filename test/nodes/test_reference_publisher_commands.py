@@ -1,6 +1,7 @@
 """Commands while the publisher runs: speeds, stops, pauses, emergencies, limits, formats."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -168,6 +169,17 @@ def test_an_emergency_stop_is_latched(graph, walker, joints):
     assert walker.trigger("resume") == "goes on"
     walker.wait_for("standing")
     assert walker.trigger("stop") == "stands already"
+
+
+def test_a_stream_that_ends_in_an_emergency_ends_the_walk_that_goes_on_after_it(graph, walker):
+    velocity = walker.talk(Twist, "cmd_vel")
+    send = partial(velocity.publish, Twist(linear=Vector3(x=FAST)))
+    graph.spin_until(lambda: send() or walker.states[-1].state == "walking", "the walk")
+    walker.trigger("emergency_stop")
+    graph.spin_for(2 * TIMEOUT)
+    walker.trigger("resume")
+    walker.trigger("resume")
+    walker.wait_for("standing")
 
 
 def test_a_gait_beyond_the_limits_is_refused_and_the_walk_goes_on(graph, walker):
