@@ -75,9 +75,12 @@ def trajectory_on(mesh: Mesh, points: RefinedPoints) -> RefinedTrajectory:
 
 
 def resampled(old: RefinedTrajectory, spring: KneeSpring, old_mesh: Mesh, mesh: Mesh) -> RefinedPoints:
-    """Evaluate the polynomials of a solution at the nodes of another mesh of the same phases."""
+    """Evaluate the polynomials of a solution at the nodes of a mesh of the same phases."""
     first = old_mesh.first_intervals
     ends = [*old.breaks[first], old.step_time]
+    if mesh is old_mesh:
+        values = old.states, old.torques, old.forces
+        return RefinedPoints(*values, np.diff(ends), old.impulses[first], spring)
     nodes = mesh.node_times(np.diff(ends))
     intervals = [old.locate(float((when[0] + when[-1]) / 2))[0] for when in nodes]
     places = [
