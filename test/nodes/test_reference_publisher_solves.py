@@ -45,7 +45,7 @@ def ask_for_a_solve(walker, publisher):
     return answer
 
 
-def test_an_emergency_stop_ends_the_command_under_way(graph, walker, publisher):
+def test_stops_and_emergency_stops_end_the_command_under_way(graph, walker, publisher):
     walker.walk(SLOWEST)
     answer = ask_for_a_solve(walker, publisher)
     walker.trigger("emergency_stop")
@@ -56,6 +56,14 @@ def test_an_emergency_stop_ends_the_command_under_way(graph, walker, publisher):
     walker.wait_for("walking", SLOWEST)
     assert walker.states[-1].target_speed == walker.states[-1].speed
 
+    answer = ask_for_a_solve(walker, publisher)
+    workers = workers_of(publisher.process.pid)
+    walker.trigger("stop")
+    refused = graph.result(answer)
+    assert (refused.success, refused.message) == (False, "a later command came first")
+    # Not one that was let run to its end: its process is gone.
+    graph.spin_until(lambda: not any(exists(worker) for worker in workers), "the end of the worker")
+
 
 def test_an_emergency_stop_drops_a_gait_that_has_not_begun(graph, walker):
     walker.trigger("pause")
@@ -65,17 +73,6 @@ def test_an_emergency_stop_drops_a_gait_that_has_not_begun(graph, walker):
     walker.trigger("resume")
     walker.wait_for("standing")
     assert walker.states[-1].target_speed == 0
-
-
-def test_a_later_command_ends_the_solve_for_an_earlier_one(graph, walker, publisher):
-    walker.walk(SLOWEST)
-    answer = ask_for_a_solve(walker, publisher)
-    workers = workers_of(publisher.process.pid)
-    walker.trigger("stop")
-    refused = graph.result(answer)
-    assert (refused.success, refused.message) == (False, "a later command came first")
-    # Not one that was let run to its end: its process is gone.
-    graph.spin_until(lambda: not any(exists(worker) for worker in workers), "the end of the worker")
 
 
 @pytest.fixture
@@ -90,30 +87,23 @@ def works_on(graph):
     return works_on
 
 
-def test_a_set_point_ends_the_work_on_the_one_before(graph, walker, works_on):
+def test_a_newer_speed_ends_the_work_on_the_one_before(graph, walker, works_on):
     walker.walk(SLOWEST)
     speed = walker.talk(Float64, "target_speed")
     speed.publish(Float64(data=FASTEST))
     graph.spin_until(lambda: works_on(FASTEST), "the solve")
     speed.publish(Float64(data=SLOW))
     walker.wait_for("walking", SLOW)
-    assert not any(state.target_speed == pytest.approx(FASTEST) for state in walker.states)
 
-
-def test_a_stream_ends_the_work_on_a_speed_when_it_holds_another(graph, walker, works_on):
-    walker.walk(SLOWEST)
     velocity = walker.talk(Twist, "cmd_vel")
 
-    def send(speed):
+    def walks(speed):
         velocity.publish(Twist(linear=Vector3(x=speed)))
+        return (walker.states[-1].state, walker.states[-1].speed) == ("walking", pytest.approx(speed))
 
-    graph.spin_until(lambda: send(FASTEST) or works_on(FASTEST), "the solve")
-
-    def walks_slowly():
-        send(SLOW)
-        return (walker.states[-1].state, walker.states[-1].speed) == ("walking", pytest.approx(SLOW))
-
-    graph.spin_until(walks_slowly, "the other speed")
+    graph.spin_until(lambda: not works_on(FASTEST), "the end of the solve")
+    graph.spin_until(lambda: walks(FASTEST) or works_on(FASTEST), "the other solve")
+    graph.spin_until(lambda: walks(SLOWEST), "the other speed")
     assert not any(state.target_speed == pytest.approx(FASTEST) for state in walker.states)
 
 
