@@ -1,5 +1,21 @@
 """The exceptions of walk_optimizer: one base class, one subclass for each kind of fault."""
 
+_LONGEST = 100
+
+
+def quoted(value: object) -> str:
+    """Return a value in quotes, as messages show what they got; of a long one the middle is left out."""
+    return shortened(repr(value))
+
+
+def shortened(text: str) -> str:
+    """Return a text of about a line; of a longer one the middle is left out."""
+    left_out = len(text) - _LONGEST
+    if left_out <= 0:
+        return text
+    half = _LONGEST // 2
+    return f"{text[:half]}... {left_out} characters ...{text[-half:]}"
+
 
 class WalkOptimizerError(Exception):
     """Base class of every error that this package raises on purpose."""

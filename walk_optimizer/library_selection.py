@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from walk_optimizer.errors import GaitNotFoundError, InvalidRequestError
+from walk_optimizer.errors import GaitNotFoundError, InvalidRequestError, quoted
 from walk_optimizer.gait import Gait
 from walk_optimizer.interpolation import interpolated
 from walk_optimizer.library_entries import LibraryEntry, Source
@@ -84,7 +84,7 @@ def parse_selection(name: Selection | str) -> Selection:
         return Selection(name)
     except ValueError:
         allowed = ", ".join(entry.value for entry in Selection)
-        raise InvalidRequestError(f"unknown selection {name!r}; allowed are {allowed}") from None
+        raise InvalidRequestError(f"unknown selection {quoted(name)}; allowed are {allowed}") from None
 
 
 def select(entries: Sequence[LibraryEntry], query: Query) -> tuple[Gait, Source]:

@@ -8,7 +8,7 @@ from functools import cache
 from numbers import Real
 from typing import Any
 
-from walk_optimizer.errors import ConfigurationError, InvalidRequestError
+from walk_optimizer.errors import ConfigurationError, InvalidRequestError, quoted
 from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.resources import config_file, require_positive, settings_from_yaml
 
@@ -204,5 +204,5 @@ def parse_speed(text: str) -> float:
     except ValueError:
         match = None
     if match is None:
-        raise InvalidRequestError(f"speed {text!r} not understood; write 0.3185, 0.3185m/s or 1.15km/h")
+        raise InvalidRequestError(f"speed {quoted(text)} not understood; write 0.3185, 0.3185m/s or 1.15km/h")
     return value / KMH_PER_MS if match[2] == "km/h" else value

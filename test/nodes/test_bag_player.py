@@ -92,7 +92,7 @@ def test_a_topic_that_another_node_publishes_is_refused_unless_it_gets_another_n
     assert len(elsewhere) == COUNT
     for remap, words in (
         ("/joints", "is no remap: give FROM:=TO"),
-        ("/joints:=/other", "/joints of '/joints:=/other' is not played; played are"),
+        ("/joints:=/other", "'/joints' is not played; played are"),
         (f"{JOINTS.name}:=no name", "'no name' is no name of a topic"),
     ):
         player = play(bag, "--remap", remap)

@@ -193,7 +193,10 @@ def test_a_bag_that_can_not_be_begun_is_told_and_not_claimed(graph, publisher, t
     heard = graph.subscribe(DiagnosticArray, "/diagnostics")
     for place in ("/dev/null/bags", "~nobody_of_that_name/bags", "/tmp/" + 300 * "n"):
         record(graph, place)
-        wait_for(graph, heard, DiagnosticStatus.ERROR, f"not recording: Cannot write {place}")
+        wait_for(graph, heard, DiagnosticStatus.ERROR, f"not recording: Cannot write {place[:40]}")
+    refused = graph.call(StartRecording, START, directory="/tmp/" + 100_000 * "n")
+    assert "Cannot write /tmp/nnn" in refused.message
+    assert len(refused.message) < 300
     record(graph, tmp_path)
     wait_for(graph, heard, DiagnosticStatus.OK, f"recording to {tmp_path}")
     assert graph.call(StopRecording, STOP).success

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeAlias
 
-from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.errors import InvalidRequestError, quoted
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest, gait_table_settings, parse_speed
 
@@ -105,7 +105,7 @@ def parse_points(text: str) -> int:
     if points is None:
         settings = gait_table_settings()
         allowed = f"{settings.minimum_points} to {settings.maximum_points}"
-        raise InvalidRequestError(f"N is {text!r} grid points, allowed is {allowed}")
+        raise InvalidRequestError(f"N is {quoted(text)} grid points, allowed is {allowed}")
     return points
 
 
@@ -118,7 +118,7 @@ def parse_count(text: str, name: str, most: int | None = None) -> int:
     count = _whole(text)
     if count is None or count < 1 or (most is not None and count > most):
         allowed = "of at least 1" if most is None else f"from 1 to {most}"
-        raise InvalidRequestError(f"{name} is {text!r}, allowed are whole numbers {allowed}")
+        raise InvalidRequestError(f"{name} is {quoted(text)}, allowed are whole numbers {allowed}")
     return count
 
 
@@ -157,5 +157,5 @@ def parse_number(text: str, name: str, unit: str, above: float = -math.inf) -> f
         value = math.nan
     if not above < value < math.inf:
         least = f" above {above:g}" if math.isfinite(above) else ""
-        raise InvalidRequestError(f"{name} is {text!r}, allowed are finite numbers{least}, {unit}")
+        raise InvalidRequestError(f"{name} is {quoted(text)}, allowed are finite numbers{least}, {unit}")
     return value

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.errors import InvalidRequestError, quoted
 from walk_optimizer.examples import pictures
 from walk_optimizer.examples.finding import Finding
 from walk_optimizer.examples.finger import move_disc
@@ -66,4 +66,4 @@ def solve_example(name: str, time_limit: float | None = None) -> Example:
     if name == "standing-start":
         start = set_off(WalkerParameters.from_yaml(), StandingStart(), session)
         return Example(start.finding, lambda path: pictures.draw_walk(start, path))
-    raise InvalidRequestError(f"there is no example {name!r}; known are {', '.join(NAMES)}")
+    raise InvalidRequestError(f"there is no example {quoted(name)}; known are {', '.join(NAMES)}")

@@ -8,7 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from walk_optimizer.errors import ConfigurationError, InvalidRequestError
+from walk_optimizer.errors import ConfigurationError, InvalidRequestError, quoted
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.resources import config_file, read_yaml, settings_from_entries, text_hint
 
@@ -31,7 +31,7 @@ class SpringMode(StrEnum):
             return cls(name)
         except ValueError:
             allowed = ", ".join(mode.value for mode in cls)
-            raise InvalidRequestError(f"unknown spring mode {name!r}; allowed are {allowed}") from None
+            raise InvalidRequestError(f"unknown spring mode {quoted(name)}; allowed are {allowed}") from None
 
 
 @dataclass(frozen=True)

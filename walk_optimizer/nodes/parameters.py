@@ -18,7 +18,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
-from walk_optimizer.errors import ConfigurationError, WalkOptimizerError
+from walk_optimizer.errors import ConfigurationError, WalkOptimizerError, quoted, shortened
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,10 @@ def require_name(name: str) -> None:
         validate_full_topic_name(expand_topic_name(name, "node", "/"))
     except (NameValidationException, ValueError, RuntimeError) as error:
         # Without the name once more with a mark below, and without a place in rcl's sources.
-        reason = str(error).split("\n")[0].split(", at /")[0].rstrip(":")
-        raise ConfigurationError(f"{name!r} is no name of a topic or service: {reason}") from error
+        reason = str(error).split("\n")[0].split(", at /")[0].rstrip(":").rpartition(" is invalid: ")[2]
+        raise ConfigurationError(
+            f"{quoted(name)} is no name of a topic or service: {shortened(reason)}"
+        ) from error
 
 
 class NodeParameters:

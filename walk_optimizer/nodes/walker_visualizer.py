@@ -17,7 +17,7 @@ from walk_optimizer.description.settings import description_settings
 from walk_optimizer.description.skeleton import skeleton_of
 from walk_optimizer.description.transforms import base_transform, link_transforms
 from walk_optimizer.description.urdf import walker_urdf
-from walk_optimizer.errors import ConfigurationError, WalkOptimizerError
+from walk_optimizer.errors import ConfigurationError, WalkOptimizerError, quoted
 from walk_optimizer.nodes.parameters import Setting
 from walk_optimizer.nodes.qos import LATCHED, STREAM
 from walk_optimizer.nodes.running import run_node
@@ -37,7 +37,9 @@ FloatArray = NDArray[np.float64]
 
 def _check_frame(name: str) -> None:
     if not name or name.startswith("/"):
-        raise ConfigurationError(f"{name!r} is no frame: give a name without a leading slash, such as odom")
+        raise ConfigurationError(
+            f"{quoted(name)} is no frame: give a name without a leading slash, such as odom"
+        )
 
 
 SETTINGS = [

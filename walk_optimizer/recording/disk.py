@@ -6,6 +6,7 @@ import os
 import shutil
 from pathlib import Path
 
+from walk_optimizer.errors import shortened
 from walk_optimizer.recording.errors import BagNotWritableError, DiskFullError, RecordingError
 from walk_optimizer.resources import sync_directory
 
@@ -108,6 +109,7 @@ def nearest_directory(path: Path) -> Path:
 def write_error(path: Path, error: OSError) -> RecordingError:
     """Return the recording error that says what an operating system error means for a bag."""
     reason = error.strerror or str(error)
+    place = shortened(str(path)) if error.errno == errno.ENAMETOOLONG else path
     if error.errno in _FULL_ERRNOS:
-        return DiskFullError(f"Cannot write {path}: {reason}; {MAKE_SPACE}")
-    return BagNotWritableError(f"Cannot write {path}: {reason}; name a folder that can be written")
+        return DiskFullError(f"Cannot write {place}: {reason}; {MAKE_SPACE}")
+    return BagNotWritableError(f"Cannot write {place}: {reason}; name a folder that can be written")

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
-from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.errors import InvalidRequestError, quoted
 from walk_optimizer.recording.info import BagInfo
 from walk_optimizer.recording.reading import BagMessage, read_messages
 
@@ -82,9 +82,11 @@ def topic_names(
     for remap in remaps:
         name, mark, other = remap.partition(":=")
         if not (mark and name and other):
-            raise InvalidRequestError(f"{remap!r} is no remap: give FROM:=TO, such as /tf:=/recorded/tf")
+            raise InvalidRequestError(
+                f"{quoted(remap)} is no remap: give FROM:=TO, such as /tf:=/recorded/tf"
+            )
         if name not in names:
-            raise InvalidRequestError(f"{name} of {remap!r} is not played; played are {', '.join(wanted)}")
+            raise InvalidRequestError(f"{quoted(name)} is not played; played are {', '.join(wanted)}")
         names[name] = other
     return names
 
