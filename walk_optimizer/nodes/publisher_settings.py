@@ -18,7 +18,7 @@ CERTIFIED, BLENDED = "certified", "blended"
 
 
 # A gap of fewer periods of the references than this would be exceeded in the ordinary run.
-_LEAST_PERIODS = 2.0
+LEAST_PERIODS = 2.0
 
 
 def _check_speed(speed: float) -> None:
@@ -107,7 +107,7 @@ SETTINGS = [
         "longest_gap",
         0.1,
         "A clock that moves further than this between two references has jumped, and the walk holds; "
-        f"{_LEAST_PERIODS:g} periods of `rate` at least [s].",
+        f"{LEAST_PERIODS:g} periods of `rate` at least [s].",
         0.002,
         10.0,
     ),
@@ -220,43 +220,6 @@ def stream_format(parameters: NodeParameters) -> StreamFormat:
         command_interface=parameters["command_interface"],
         frame_id=parameters["frame_id"],
     )
-
-
-def require_no_late_start(parameters: NodeParameters, changes: Mapping[str, Any]) -> None:
-    """Refuse to change the speed at activation while a node is active.
-
-    It would do nothing now, and have the walker set off when nobody thinks of it any more.
-
-    Raises:
-        ConfigurationError: says what would do.
-    """
-    if changes.get("initial_speed", parameters["initial_speed"]) != parameters["initial_speed"]:
-        raise ConfigurationError(
-            "it only counts when the node is activated, and it is active; send the speed to ~/target_speed, "
-            "or deactivate the node before"
-        )
-
-
-RATE_SETTINGS = {"rate", "longest_gap"}
-
-
-def require_steady(parameters: NodeParameters, changes: Mapping[str, Any] | None = None) -> None:
-    """Refuse references so far apart that the walk would hold at each of them.
-
-    Args:
-        parameters: Of the node.
-        changes: Values that count instead of the parameters.
-
-    Raises:
-        ConfigurationError: says what would do.
-    """
-    rate, gap = ((changes or {}).get(name, parameters[name]) for name in ("rate", "longest_gap"))
-    if rate * gap < _LEAST_PERIODS:
-        raise ConfigurationError(
-            f"longest_gap is {gap:g} s and rate {rate:g} Hz, so the walk would hold at references that come "
-            f"in time; allowed is a longest_gap of at least {_LEAST_PERIODS / rate:g} s at this rate, or a "
-            f"rate of at least {_LEAST_PERIODS / gap:g} Hz with this gap"
-        )
 
 
 LIMIT_SETTINGS = {"joint_torque_limits", "joint_speed_limits"}

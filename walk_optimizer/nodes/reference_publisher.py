@@ -17,22 +17,21 @@ from walk_optimizer.nodes.bag import StreamBag
 from walk_optimizer.nodes.cycle_message import CycleMessages
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.lifecycle import ManagedNode, NotActiveError
+from walk_optimizer.nodes.publisher_checks import RATE_SETTINGS, require_no_late_start, require_steady
 from walk_optimizer.nodes.publisher_health import PublisherHealth
 from walk_optimizer.nodes.publisher_settings import (
     FORMAT_SETTINGS,
     LIMIT_SETTINGS,
-    RATE_SETTINGS,
     SETTINGS,
     joint_limits,
-    require_no_late_start,
-    require_steady,
     stream_format,
 )
 from walk_optimizer.nodes.recording_control import RecordingControl
 from walk_optimizer.nodes.running import run_node
 from walk_optimizer.nodes.speed_commands import SpeedCommands
 from walk_optimizer.nodes.transition_planner import TransitionPlanner
-from walk_optimizer.nodes.walk_commands import SupersededError, WalkCommands
+from walk_optimizer.nodes.walk_commands import WalkCommands
+from walk_optimizer.nodes.walk_order import SupersededError
 from walk_optimizer.nodes.walker_setting import walker_of
 from walk_optimizer.phase_clock import Motion
 from walk_optimizer.request import GaitRequest

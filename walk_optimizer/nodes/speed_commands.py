@@ -16,7 +16,8 @@ from walk_optimizer.nodes.lifecycle import ManagedNode
 from walk_optimizer.nodes.planar_twist import IgnoredParts, forward_speed
 from walk_optimizer.nodes.qos import COMMAND
 from walk_optimizer.nodes.qos_warnings import warn_of_publishers
-from walk_optimizer.nodes.walk_commands import SupersededError, WalkCommands
+from walk_optimizer.nodes.walk_commands import WalkCommands
+from walk_optimizer.nodes.walk_order import SupersededError
 from walk_optimizer.request import GaitRequest
 
 # How often it is looked whether a stream of commands has fallen silent, in [s].

@@ -1,7 +1,5 @@
 """From commands to steps: which speed is to be walked, and how the walk gets there."""
 
-import time
-
 from walk_optimizer_interfaces.srv import GetGait
 
 from walk_optimizer.errors import GaitNotFoundError, WalkOptimizerError
@@ -13,6 +11,7 @@ from walk_optimizer.nodes.remote_service import RemoteService
 from walk_optimizer.nodes.streamed_gait import StreamedGait
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
 from walk_optimizer.nodes.transition_planner import TransitionPlanner
+from walk_optimizer.nodes.walk_order import WalkOrder
 from walk_optimizer.phase_clock import Motion
 from walk_optimizer.profile import StepProfile
 from walk_optimizer.request import GaitRequest
@@ -32,39 +31,8 @@ _ONCE_RESUMED = {
 }
 
 
-class SupersededError(WalkOptimizerError):
-    """A later command, or an emergency stop, came before this one could begin."""
-
-
 class EmergencyStopError(WalkOptimizerError):
     """The emergency stop is still in force."""
-
-
-class _Order:
-    """A command for as long as it is carried out."""
-
-    def __init__(self, request: GaitRequest) -> None:
-        """Count, until `end`."""
-        self._speed, self._began, self._end = request.speed, time.monotonic(), ""
-
-    def __str__(self) -> str:
-        """Return what is being done, if it is; empty otherwise."""
-        if self._end:
-            return ""
-        return f"working on {self._speed:.4f} m/s for {time.monotonic() - self._began:.0f} s"
-
-    def end(self, reason: str) -> None:
-        """Count no more, for the first of the reasons that are given."""
-        self._end = self._end or reason
-
-    def require_valid(self) -> None:
-        """Refuse to go on with what does not count any more.
-
-        Raises:
-            SupersededError: says why.
-        """
-        if self._end:
-            raise SupersededError(self._end)
 
 
 class WalkCommands:
@@ -102,7 +70,7 @@ class WalkCommands:
         self._standing = standing_pose(walker, settings.feet_distance, settings.knee_bend)
         self.limits = JointLimits()
         self.refusal = ""
-        self._order: _Order | None = None
+        self._order: WalkOrder | None = None
 
     def begin(self) -> StandProfile:
         """Return what the stream begins with.
@@ -144,7 +112,7 @@ class WalkCommands:
         """
         self._require_no_emergency()
         self.supersede()
-        self._order = order = _Order(request)
+        self._order = order = WalkOrder(request)
         try:
             return await self._carry_out(request, order, wait_for_library)
         except WalkOptimizerError:
@@ -153,7 +121,7 @@ class WalkCommands:
         finally:
             order.end("it has been carried out")
 
-    async def _carry_out(self, request: GaitRequest, order: _Order, wait_for_library: bool) -> str:
+    async def _carry_out(self, request: GaitRequest, order: WalkOrder, wait_for_library: bool) -> str:
         gait, source = await self._fetch(request, order if wait_for_library else None)
         order.require_valid()
         keeping = self._needed(f"to walk at {gait.speed:.4f} m/s", gait.profile)
@@ -205,7 +173,7 @@ class WalkCommands:
             self._order.end(reason)
         self._planner.give_up()
 
-    async def _fetch(self, request: GaitRequest, waiting_as: _Order | None) -> tuple[StreamedGait, str]:
+    async def _fetch(self, request: GaitRequest, waiting_as: WalkOrder | None) -> tuple[StreamedGait, str]:
         """Return a gait of the library, and the sentence that it came with.
 
         Args:
@@ -235,7 +203,7 @@ class WalkCommands:
             raise GaitNotFoundError(answer.message)
         return StreamedGait.from_message(answer.gait, self._walker), answer.message
 
-    async def _lead_to(self, goal: StreamedGait, order: _Order, staying: tuple[JointNeed, ...]) -> None:
+    async def _lead_to(self, goal: StreamedGait, order: WalkOrder, staying: tuple[JointNeed, ...]) -> None:
         """Have the stream walk to a gait, which needs something itself, from the pace that it then has."""
         while True:
             order.require_valid()

@@ -1,0 +1,44 @@
+"""Which parameters of `reference_publisher` go together, and what may be changed while it is active."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from walk_optimizer.errors import ConfigurationError
+from walk_optimizer.nodes.parameters import NodeParameters
+from walk_optimizer.nodes.publisher_settings import LEAST_PERIODS
+
+RATE_SETTINGS = {"rate", "longest_gap"}
+
+
+def require_no_late_start(parameters: NodeParameters, changes: Mapping[str, Any]) -> None:
+    """Refuse to change the speed at activation while a node is active.
+
+    It would do nothing now, and have the walker set off when nobody thinks of it any more.
+
+    Raises:
+        ConfigurationError: says what would do.
+    """
+    if changes.get("initial_speed", parameters["initial_speed"]) != parameters["initial_speed"]:
+        raise ConfigurationError(
+            "it only counts when the node is activated, and it is active; send the speed to ~/target_speed, "
+            "or deactivate the node before"
+        )
+
+
+def require_steady(parameters: NodeParameters, changes: Mapping[str, Any] | None = None) -> None:
+    """Refuse references so far apart that the walk would hold at each of them.
+
+    Args:
+        parameters: Of the node.
+        changes: Values that count instead of the parameters.
+
+    Raises:
+        ConfigurationError: says what would do.
+    """
+    rate, gap = ((changes or {}).get(name, parameters[name]) for name in ("rate", "longest_gap"))
+    if rate * gap < LEAST_PERIODS:
+        raise ConfigurationError(
+            f"longest_gap is {gap:g} s and rate {rate:g} Hz, so the walk would hold at references that come "
+            f"in time; allowed is a longest_gap of at least {LEAST_PERIODS / rate:g} s at this rate, or a "
+            f"rate of at least {LEAST_PERIODS / gap:g} Hz with this gap"
+        )
