@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from nodes.conftest import FAST, SLOW, stock
 from nodes.graph import assert_left_cleanly, exists, workers_of
 from nodes.walking import MODE, NODE, Walker, assert_continuous, stamp_ns
+from rcl_interfaces.srv import DescribeParameters
 from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
@@ -91,6 +92,10 @@ def unfit_values(setting):
     yield "text" if not isinstance(setting.default, str) else 7
     if isinstance(setting.default, float):
         yield math.nan
+    if setting.choices is not None:
+        yield "rubber" if isinstance(setting.default, str) else [*setting.default[1:], "rubber"]
+    if setting.name == "frame_id":
+        yield from ("", "/base_link", "base link")
     if setting.low is not None and setting.high is not None:
         kind = type(setting.default)
         yield kind(min(setting.high * 2 + 1, 2**63 - 1) if kind is int else setting.high * 2 + 1)
@@ -106,10 +111,27 @@ def test_parameters_out_of_range_or_of_a_wrong_type_are_refused_by_name(graph, w
             assert not answer.successful, (setting.name, value)
             assert any(text in answer.reason for text in (setting.name, "read-only", "Wrong parameter type"))
         assert graph.get_parameter(NODE, setting.name) == before
+    (answer,) = graph.set_parameters(NODE, Parameter("frame_id", value=""))
+    assert answer.reason == (
+        "frame_id: '' is no frame: give a name without spaces or a leading slash, such as odom"
+    )
     topics = Parameter("recording_topics", value=["/diagnostics", "no name"])
     (answer,) = graph.set_parameters(NODE, topics)
     assert (answer.successful, "'no name' is no name of a topic" in answer.reason) == (False, True)
     go_on(walker)
+
+
+def test_parameters_of_choices_tell_them(graph, walker):
+    """As `ros2 param describe` asks."""
+    settings = [setting for setting in SETTINGS if setting.choices is not None]
+    assert {"spring_mode", "selection", "transitions", "joint_names"} <= {one.name for one in settings}
+    answer = graph.call(
+        DescribeParameters, f"{NODE}/describe_parameters", names=[one.name for one in settings]
+    )
+    for setting, descriptor in zip(settings, answer.descriptors, strict=True):
+        names = ", ".join(setting.choices)
+        lists = isinstance(setting.default, list)
+        assert descriptor.additional_constraints == (f"each of {names} once" if lists else f"one of {names}")
 
 
 def test_too_little_free_space_refuses_a_recording_and_nothing_else(graph, walker, tmp_path):

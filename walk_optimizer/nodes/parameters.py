@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -33,6 +34,7 @@ class Setting:
         high: Largest value of a number.
         read_only: Whether it can only be set at the start.
         check: Raises a WalkOptimizerError for a value that is not allowed.
+        choices: Texts that are allowed; a list has to hold each of them once. None for any.
     """
 
     name: str
@@ -42,10 +44,13 @@ class Setting:
     high: float | None = None
     read_only: bool = False
     check: Callable[[Any], object] | None = None
+    choices: Sequence[str] | None = None
 
     def descriptor(self) -> ParameterDescriptor:
         """Return what `ros2 param describe` shows."""
-        descriptor = ParameterDescriptor(description=self.description, read_only=self.read_only)
+        descriptor = ParameterDescriptor(
+            description=self.description, read_only=self.read_only, additional_constraints=self.constraint
+        )
         if self.low is None or self.high is None:
             return descriptor
         if isinstance(self.default, int):
@@ -56,16 +61,34 @@ class Setting:
             descriptor.floating_point_range = [bounds]
         return descriptor
 
+    @property
+    def constraint(self) -> str:
+        """What `ros2 param describe` says of the choices."""
+        if self.choices is None:
+            return ""
+        names = ", ".join(self.choices)
+        return f"each of {names} once" if isinstance(self.default, list) else f"one of {names}"
+
     def require(self, value: Any) -> None:
         """Refuse a value.
 
         Raises:
-            WalkOptimizerError: it is not finite, or `check` refuses it.
+            WalkOptimizerError: it is not finite, none of the choices, or `check` refuses it.
         """
         if isinstance(value, float) and not math.isfinite(value):
             raise ConfigurationError(f"{value} is not finite")
+        if self.choices is not None:
+            self._require_choice(value, self.choices)
         if self.check is not None:
             self.check(value)
+
+    def _require_choice(self, value: Any, choices: Sequence[str]) -> None:
+        names = ", ".join(choices)
+        if isinstance(self.default, list):
+            if sorted(value) != sorted(choices):
+                raise ConfigurationError(f"{quoted(list(value))} is no order of {names}")
+        elif value not in choices:
+            raise ConfigurationError(f"{quoted(value)} is none of {names}")
 
 
 def require_name(name: str) -> None:
@@ -82,6 +105,18 @@ def require_name(name: str) -> None:
         raise ConfigurationError(
             f"{quoted(name)} is no name of a topic or service: {shortened(reason)}"
         ) from error
+
+
+def require_frame(name: str) -> None:
+    """Refuse what is no name of a frame.
+
+    Raises:
+        ConfigurationError: says what is allowed.
+    """
+    if not re.fullmatch(r"[^\s/]\S*", name):
+        raise ConfigurationError(
+            f"{quoted(name)} is no frame: give a name without spaces or a leading slash, such as odom"
+        )
 
 
 class NodeParameters:

@@ -1,13 +1,12 @@
 """The parameters of the node `reference_publisher`."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.joint_limits import JointLimits, limits_of
 from walk_optimizer.library import Selection
 from walk_optimizer.model.parameters import SpringMode
-from walk_optimizer.nodes.parameters import NodeParameters, Setting, require_name
+from walk_optimizer.nodes.parameters import NodeParameters, Setting, require_frame, require_name
 from walk_optimizer.nodes.stream_messages import INTERFACES, TORQUES, StreamFormat
 from walk_optimizer.nodes.walker_setting import WALKER_FILE
 from walk_optimizer.recording import Compression, RecorderSettings
@@ -31,26 +30,6 @@ def _check_names(names: Sequence[str]) -> None:
         require_name(name)
 
 
-def _order_of(names: Sequence[str]) -> Callable[[list[str]], None]:
-    """Return a check that a list holds each of the names once."""
-
-    def check(order: list[str]) -> None:
-        if sorted(order) != sorted(names):
-            raise ConfigurationError(f"{list(order)} is no order of {', '.join(names)}")
-
-    return check
-
-
-def _one_of(names: Sequence[str]) -> Callable[[str], None]:
-    """Return a check that a text is one of the names."""
-
-    def check(name: str) -> None:
-        if name not in names:
-            raise ConfigurationError(f"{name!r} is none of {', '.join(names)}")
-
-    return check
-
-
 SETTINGS = [
     Setting("rate", 500.0, "References per second [Hz].", 1.0, 1000.0),
     Setting("streaming", True, "Whether references are published; the walk holds while not."),
@@ -65,13 +44,13 @@ SETTINGS = [
         "spring_mode",
         SpringMode.STIFFNESS_AND_EQUILIBRIUM.value,
         f"Knee springs of the gaits for ~/target_speed and ~/cmd_vel: {', '.join(SpringMode)}.",
-        check=SpringMode.parse,
+        choices=list(SpringMode),
     ),
     Setting(
         "selection",
         Selection.EXACT.value,
         "Which gait of the library a speed is walked with: exact, interpolated or nearest (see GetGait).",
-        check=_one_of(list(Selection)),
+        choices=list(Selection),
     ),
     Setting(
         "command_timeout",
@@ -115,13 +94,13 @@ SETTINGS = [
         "joint_names",
         list(JOINTS),
         "Order of the joints in all messages.",
-        check=_order_of(JOINTS),
+        choices=JOINTS,
     ),
     Setting(
         "command_interface",
         "position",
         f"What ~/commands holds for each joint: {', '.join(INTERFACES)}.",
-        check=_one_of(INTERFACES),
+        choices=INTERFACES,
     ),
     Setting(
         "trajectory_effort",
@@ -134,16 +113,16 @@ SETTINGS = [
         list(TORQUES),
         "Order of ~/feedforward_torques: u1 hip (on the left, its opposite on the right), u2 left knee, "
         "u3 right knee.",
-        check=_order_of(TORQUES),
+        choices=TORQUES,
     ),
-    Setting("frame_id", "base_link", "Frame in the header of ~/joint_reference."),
+    Setting("frame_id", "base_link", "Frame in the header of ~/joint_reference.", check=require_frame),
     WALKER_FILE,
     Setting(
         "transitions",
         CERTIFIED,
         f"{CERTIFIED}: speeds change by steps that are solved for and certified, or not at all. {BLENDED}: "
         "by one step that blends the references, at once; smooth, but no walker can follow it exactly.",
-        check=_one_of((CERTIFIED, BLENDED)),
+        choices=(CERTIFIED, BLENDED),
     ),
     Setting(
         "transition_time_limit", 120.0, "Longest solve for the steps between two gaits [s].", 1.0, 3600.0
@@ -183,7 +162,7 @@ SETTINGS = [
         "recording_compression",
         "none",
         "none, zstd or lz4.",
-        check=_one_of([entry.value for entry in Compression]),
+        choices=[entry.value for entry in Compression],
     ),
     Setting("recording_file_bytes", 0, "A further file is begun at this size; 0 never [byte].", 0, 1 << 62),
     Setting(

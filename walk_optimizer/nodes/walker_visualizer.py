@@ -17,8 +17,8 @@ from walk_optimizer.description.settings import description_settings
 from walk_optimizer.description.skeleton import skeleton_of
 from walk_optimizer.description.transforms import base_transform, link_transforms
 from walk_optimizer.description.urdf import walker_urdf
-from walk_optimizer.errors import ConfigurationError, WalkOptimizerError, quoted
-from walk_optimizer.nodes.parameters import Setting
+from walk_optimizer.errors import ConfigurationError, WalkOptimizerError
+from walk_optimizer.nodes.parameters import Setting, require_frame
 from walk_optimizer.nodes.qos import LATCHED, STREAM
 from walk_optimizer.nodes.running import run_node
 from walk_optimizer.nodes.scene_markers import SceneMarkers
@@ -33,13 +33,6 @@ from walk_optimizer.scene.scene import WalkScene
 from walk_optimizer.scene.tracking import WalkerPose
 
 FloatArray = NDArray[np.float64]
-
-
-def _check_frame(name: str) -> None:
-    if not name or name.startswith("/"):
-        raise ConfigurationError(
-            f"{quoted(name)} is no frame: give a name without a leading slash, such as odom"
-        )
 
 
 SETTINGS = [
@@ -57,7 +50,7 @@ SETTINGS = [
         "odom",
         "Frame of the ground; base_link moves in it.",
         read_only=True,
-        check=_check_frame,
+        check=require_frame,
     ),
     Setting(
         "link_transforms",
