@@ -213,7 +213,8 @@ the complementarity problem.
 A solve has *converged* if its solver says so and every residual of our own certificate is within its
 tolerance; *worst residual* is in units of that tolerance. F is in (N m)^2. A solver counts what it calls
 iterations; for SNOPT these are evaluations. A solve may take {TIME_LIMIT:.0f} s of processor time. fatrop and
-SNOPT can't be watched: where they are stopped, the row shows their start. `ipopt` is IPOPT with the package's
+SNOPT can't be watched: where they are stopped, the row shows their start, with 0 iterations. *Code -9*: one
+quadratic program went on beyond the limit, and the process was killed. `ipopt` is IPOPT with the package's
 factorisation, `uno` is Uno's filter SQP, `fatrop` factorises stage by stage, `snopt` is Drake's.
 """
 
