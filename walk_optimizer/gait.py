@@ -29,7 +29,7 @@ class CertificateEntry(FamilyViolation):
 
     def __str__(self) -> str:
         """Return the entry as part of a sentence."""
-        return f"{self.family} is off by {self.violation:.3g} {self.unit}, allowed is {self.tolerance:.3g}"
+        return f"{self.family} is off by {self.amount}, allowed is {self.tolerance:.3g}"
 
     @property
     def met(self) -> bool:

@@ -46,7 +46,7 @@ def verify_file(path: Path, walker: WalkerParameters) -> Verification:
         return Verification(path, None, None, str(error))
     certificate = certify(gait.walker, gait.request, gait.spring, gait.trajectory)
     failed = ", ".join(
-        f"{entry.family} is {entry.violation:.3g} {entry.unit}, allowed {entry.tolerance:.3g}"
+        f"{entry.family} is {entry.amount}, allowed {entry.tolerance:.3g}"
         for entry in (*certificate.entries, *_stated_entries(gait), *_refined_entries(gait))
         if not entry.met
     )

@@ -125,7 +125,7 @@ def test_the_refusal_names_residual_and_bound(neighbours):
     request = GaitRequest.for_speed(BETWEEN, MODE)
     tight = replace(interpolation_bounds(), force=1e-6)
     with pytest.raises(
-        GaitNotFoundError, match=r"not interpolated between .*: dynamics is off by .* N, N m, allowed is"
+        GaitNotFoundError, match=r"not interpolated between .*: dynamics is off by .* N or N m, allowed is"
     ):
         interpolated(*neighbours, request, tight)
 

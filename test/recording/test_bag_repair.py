@@ -224,6 +224,17 @@ def test_a_failed_repair_leaves_nothing(tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["walk"]
 
 
+def test_repair_is_advised_only_where_something_can_be_saved(tmp_path):
+    whole = write_bag(tmp_path / "walk", range(2000)) / "walk_0.mcap"
+    for size, words in (
+        (0, "damaged (1 x cut_off); nothing was recorded that could be saved"),
+        (whole.stat().st_size // 2, "damaged (1 x cut_off); repair writes a whole bag from what is left"),
+    ):
+        cut = tmp_path / f"cut_{size}.mcap"
+        cut.write_bytes(whole.read_bytes()[:size])
+        assert words in format_bag(describe_bag(cut))
+
+
 @pytest.mark.parametrize("use", [describe_bag, repair_bag, lambda path: list(read_messages(path))])
 @pytest.mark.parametrize("kind", ["missing", "empty folder", "text", "noise", "sqlite"])
 def test_what_is_no_bag_gives_one_typed_error(tmp_path, use, kind):

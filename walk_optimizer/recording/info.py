@@ -184,7 +184,9 @@ def _state(info: BagInfo) -> str:
     if info.is_whole:
         return "whole, all checksums right"
     found = [f"{info.count_damage(kind)} x {kind.value}" for kind in DamageKind if info.count_damage(kind)]
-    return f"damaged ({', '.join(found)}); repair writes a whole bag from what is left"
+    saved = "repair writes a whole bag from what is left"
+    rest = saved if info.message_count else "nothing was recorded that could be saved"
+    return f"damaged ({', '.join(found)}); {rest}"
 
 
 def _date(time_ns: int | None) -> str:

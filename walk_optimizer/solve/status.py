@@ -53,6 +53,11 @@ class FamilyViolation:
     violation: float
     unit: str
 
+    @property
+    def amount(self) -> str:
+        """The violation with its unit for a sentence: `79.7 N or N m`, where a family has rows of both."""
+        return f"{self.violation:.3g} {self.unit.replace(', ', ' or ')}"
+
 
 @dataclass(frozen=True)
 class SolveReport:
