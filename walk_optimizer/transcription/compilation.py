@@ -1,6 +1,5 @@
 """Compiles CasADi functions to machine code once, and keeps the result for the next process."""
 
-import hashlib
 import inspect
 import json
 import logging
@@ -65,12 +64,12 @@ class _Note:
 
     def __init__(self, build: Callable[..., Any], arguments: tuple[Hashable, ...], compiler: str) -> None:
         module = Path(inspect.getfile(build))
-        key = hashlib.sha256(f"{module} {build.__qualname__} {arguments!r} {compiler} {_FLAGS}".encode())
-        key.update(ca.__version__.encode())
-        for folder in dict.fromkeys([*_SOURCES, module.parent]):
-            for source in sorted(folder.glob("*.py")):
-                key.update(source.read_bytes())
-        self._path = cache_folder() / f"{build.__name__.strip('<>')}-{key.hexdigest()[:24]}.json"
+        what = f"{module} {build.__qualname__} {arguments!r} {ca.__version__}"
+        folders = dict.fromkeys([*_SOURCES, module.parent])
+        sources = (source for folder in folders for source in sorted(folder.glob("*.py")))
+        contents = [what.encode(), *(source.read_bytes() for source in sources)]
+        name = build.__name__.strip("<>")
+        self._path = library_path(name, compiler, _FLAGS, contents).with_suffix(".json")
 
     def functions(self) -> dict[str, ca.Function] | None:
         """Return the functions of the library; None without the note, or where the library does not load."""
