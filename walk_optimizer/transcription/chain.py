@@ -180,11 +180,13 @@ class _Graph:
     def _handed_on(self) -> list[Entries]:
         """Return the constant derivatives of each stage but the first by the state handed to it."""
         entries = []
-        for i in range(1, len(self.stages)):
-            previous = self.stages[i].kind.previous
-            rows, columns = np.nonzero(previous)
-            place = (self.row_offset[i] + rows, self.state_columns[columns, i - 1])
-            entries.append((*place, ca.DM(previous[rows, columns])))
+        for group in self.groups:
+            after = group.members[group.members > 0]
+            rows, columns = np.nonzero(group.kind.previous)
+            values = np.tile(group.kind.previous[rows, columns], after.size)
+            own_rows = self.row_offset[after][:, None] + rows
+            handed = self.state_columns[columns[:, None], after - 1].T
+            entries.append((own_rows.ravel(), handed.ravel(), ca.DM(values)))
         return entries
 
     def _closing(self, end_nonzeros: ca.MX) -> list[Entries]:
