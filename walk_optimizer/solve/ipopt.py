@@ -68,6 +68,9 @@ def _settings(options: SolveOptions) -> dict[str, Any]:
         "bound_relax_factor": 0.0,
         # Solutions are refined where their residual asks for it, not always.
         "min_refinement_steps": 0,
+        # Multipliers of rows come with the first iteration. Least squares give no better ones, and on chains
+        # of thousands of stages their linear system takes as long as fifty iterations.
+        "constr_mult_init_max": 0.0,
         **_linear_solver(),
     }
     if isinstance(options, IpoptOptions):
@@ -86,10 +89,8 @@ def _strategy(barrier: float | None) -> dict[str, Any]:
         "mu_max": 10 * barrier,
         "bound_push": push,
         "bound_frac": push,
-        # Multipliers of bounds as they are at this barrier parameter, not all alike; those of rows come
-        # with the first iteration, better than from least squares with the others.
+        # Multipliers of bounds as they are at this barrier parameter, not all alike.
         "bound_mult_init_method": "mu-based",
-        "constr_mult_init_max": 0.0,
         # A second right-hand side per factorisation, for the error of the first step in the products of
         # bounds and multipliers [Mehrotra1992]: a seventh fewer iterations.
         "corrector_type": "affine",
