@@ -66,6 +66,9 @@ def main():
         listener(node, args.topic, received)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
+    # What waits in the publisher while a listener is discovered arrives late, and all at once.
+    while args.kind == "listener" and not (received or stop):
+        executor.spin_once(timeout_sec=0.1)
     print("ready", flush=True)
     while not stop:
         executor.spin_once(timeout_sec=0.1)
