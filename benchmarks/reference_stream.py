@@ -365,6 +365,9 @@ publishes torques and commands at each tick. Lateness and age are the 50th, 99th
 worst age is the 99th percentile of the worst run. The last column compares rates, 99th percentiles and shares
 of a core; the aim is to be within {100 * AIM:.0f} %, what misses it is bold.
 
+A worst age far above the others is one stall: a reliable subscriber that has lost a message holds back those
+after it until the middleware sends it again. A control loop should subscribe best-effort: it then goes on.
+
 {stream_table(bare, runs, recording)}
 
 With more subscribers, each a process of its own, at {min(RATES):.0f} Hz:
