@@ -171,6 +171,19 @@ def test_an_emergency_stop_is_latched(graph, walker, joints):
     assert walker.trigger("stop") == "stands already"
 
 
+def test_a_speed_may_be_sent_again_as_soon_as_an_emergency_stop_is_released(graph, walker):
+    speed = walker.talk(Float64, "target_speed")
+    walker.trigger("emergency_stop")
+    walker.wait_for("emergency_stop")
+    speed.publish(Float64(data=SLOW))
+    graph.spin_for(0.2)
+    walker.trigger("resume")
+    walker.trigger("resume")
+    walker.wait_for("standing")
+    speed.publish(Float64(data=SLOW))
+    walker.wait_for("walking", SLOW)
+
+
 def test_a_stream_that_ends_in_an_emergency_ends_the_walk_that_goes_on_after_it(graph, walker):
     velocity = walker.talk(Twist, "cmd_vel")
     send = partial(velocity.publish, Twist(linear=Vector3(x=FAST)))

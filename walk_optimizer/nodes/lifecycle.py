@@ -112,10 +112,16 @@ class ManagedNode(LifecycleNodeMixin, SuiteNode):
 
         super().serve(kind, name, answer_if_active)
 
-    async def call(self, service: RemoteService, request: Any, timeout: float) -> Any:
+    async def call(
+        self,
+        service: RemoteService,
+        request: Any,
+        timeout: float,
+        require_wanted: Callable[[], None] = lambda: None,
+    ) -> Any:
         """Return the response of another node, while this one is active."""
         self._require_active()
-        return await super().call(service, request, timeout)
+        return await super().call(service, request, timeout, require_wanted)
 
     def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Configure, or leave no trace."""

@@ -8,6 +8,8 @@ from walk_optimizer.nodes.parameters import NodeParameters
 from walk_optimizer.nodes.publisher_settings import LEAST_PERIODS
 
 RATE_SETTINGS = {"rate", "longest_gap"}
+# What a message says with six digits is to be allowed when it is followed.
+_ROUNDING = 1e-5
 
 
 def require_no_late_start(parameters: NodeParameters, changes: Mapping[str, Any]) -> None:
@@ -36,7 +38,7 @@ def require_steady(parameters: NodeParameters, changes: Mapping[str, Any] | None
         ConfigurationError: says what would do.
     """
     rate, gap = ((changes or {}).get(name, parameters[name]) for name in ("rate", "longest_gap"))
-    if rate * gap < LEAST_PERIODS:
+    if rate * gap < LEAST_PERIODS * (1 - _ROUNDING):
         raise ConfigurationError(
             f"longest_gap is {gap:g} s and rate {rate:g} Hz, so the walk would hold at references that come "
             f"in time; allowed is a longest_gap of at least {LEAST_PERIODS / rate:g} s at this rate, or a "

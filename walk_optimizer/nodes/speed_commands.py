@@ -22,9 +22,9 @@ from walk_optimizer.request import GaitRequest
 
 # How often it is looked whether a stream of commands has fallen silent, in [s].
 _WATCH_PERIOD = 0.05
-# A speed that was refused is not asked for again within this time, however often it is sent, in [s].
+# A stream's speed that was refused is not asked for again within this time, however often it comes, in [s].
 _REFUSAL_HOLDS = 1.0
-# Commands of which all but the last are superseded, and end as soon as the library has answered them.
+# Commands of which all but the last are superseded, and about to end.
 _MOST_UNDER_WAY = 3
 
 
@@ -104,7 +104,8 @@ class SpeedCommands:
             # Only now: each time that the executor wakes costs the stream a tick at 1 kHz.
             if self._timer is None:
                 self._timer = self._node.repeat(_WATCH_PERIOD, self._look)
-            self._take(target, supersedes=target == self._last_of_stream)
+            if not self._was_just_refused(target):
+                self._take(target, supersedes=target == self._last_of_stream)
             self._last_of_stream = target
 
     def _twist_target(self, message: Twist) -> _Target | None:
@@ -136,8 +137,6 @@ class SpeedCommands:
             target: The last one that was asked for.
             supersedes: Whether what is under way ends at once, instead of being followed before.
         """
-        if self._was_just_refused(target):
-            return
         if target == self._current:
             self._waiting, self._commands.refusal = None, ""
             return
@@ -168,11 +167,13 @@ class SpeedCommands:
             text = self._commands.stop() if request is None else await self._commands.walk_at(request)
         except SupersededError:
             return
-        except WalkOptimizerError as error:
-            self._tell_refusal(error)
-            self._refused = target, time.monotonic()
+        except Exception as error:
             if self._current is target:
                 self._current = None
+            if not isinstance(error, WalkOptimizerError):
+                raise
+            self._tell_refusal(error)
+            self._refused = target, time.monotonic()
             return
         self._node.get_logger().info(text, throttle_duration_sec=1.0)
 

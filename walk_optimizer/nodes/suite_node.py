@@ -118,13 +118,20 @@ class SuiteNode(Node):
         """Have a function called after every so many [s] of the wall clock, until the timer is destroyed."""
         return self.create_timer(seconds, function, self.group, self._wall)
 
-    async def call(self, service: RemoteService, request: Any, timeout: float) -> Any:
+    async def call(
+        self,
+        service: RemoteService,
+        request: Any,
+        timeout: float,
+        require_wanted: Callable[[], None] = lambda: None,
+    ) -> Any:
         """Return the response of another node.
 
         Args:
             service: Of the other node.
             request: To send.
             timeout: Longest wait for the response in [s].
+            require_wanted: Asked all the time; a WalkOptimizerError that it raises ends the wait.
 
         Raises:
             ServiceUnavailableError: nobody offers the service, or it went away, or gave no answer.
@@ -135,6 +142,11 @@ class SuiteNode(Node):
         begin = self._wall.now()
 
         def watch() -> None:
+            try:
+                require_wanted()
+            except WalkOptimizerError as error:
+                future.set_exception(error)
+                return
             if not service.available:
                 future.set_exception(_unavailable(service, "went away"))
             elif (self._wall.now() - begin).nanoseconds * 1e-9 > timeout:

@@ -122,7 +122,7 @@ class WalkCommands:
             order.end("it has been carried out")
 
     async def _carry_out(self, request: GaitRequest, order: WalkOrder, wait_for_library: bool) -> str:
-        gait, source = await self._fetch(request, order if wait_for_library else None)
+        gait, source = await self._fetch(request, order, wait_for_library)
         order.require_valid()
         keeping = self._needed(f"to walk at {gait.speed:.4f} m/s", gait.profile)
         stand = self._stand_after(gait)
@@ -173,15 +173,18 @@ class WalkCommands:
             self._order.end(reason)
         self._planner.give_up()
 
-    async def _fetch(self, request: GaitRequest, waiting_as: WalkOrder | None) -> tuple[StreamedGait, str]:
+    async def _fetch(
+        self, request: GaitRequest, order: WalkOrder, wait_for_library: bool
+    ) -> tuple[StreamedGait, str]:
         """Return a gait of the library, and the sentence that it came with.
 
         Args:
             request: The gait.
-            waiting_as: Command that waits for a library that is not there yet.
+            order: Command that it is for.
+            wait_for_library: Whether a library that is not there yet is waited for.
 
         Raises:
-            WalkOptimizerError: the library refused, or is not there.
+            WalkOptimizerError: the library refused, or is not there, or the command does not count any more.
         """
         wanted = GetGait.Request(
             speed=request.speed,
@@ -191,12 +194,12 @@ class WalkCommands:
         while True:
             try:
                 timeout = self._node.parameters["library_timeout"]
-                answer = await self._node.call(self._library, wanted, timeout)
+                answer = await self._node.call(self._library, wanted, timeout, order.require_valid)
                 break
             except ServiceUnavailableError:
-                if waiting_as is None:
+                if not wait_for_library:
                     raise
-            waiting_as.require_valid()
+            order.require_valid()
             self._node.get_logger().warning("waiting for the library", throttle_duration_sec=10.0)
             await self._node.sleep(_RETRY_PERIOD)
         if not answer.success:

@@ -1,0 +1,26 @@
+"""What the publisher says of parameters that do not go together is to be of use."""
+
+import re
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from walk_optimizer.errors import ConfigurationError
+from walk_optimizer.nodes.publisher_checks import require_steady
+
+
+@given(rate=st.floats(1.0, 1000.0), gap=st.floats(0.002, 1.0))
+def test_what_is_advised_is_allowed(rate, gap):
+    try:
+        require_steady({"rate": rate, "longest_gap": gap})
+    except ConfigurationError as refusal:
+        text = str(refusal)
+        least_gap, least_rate = re.search(r"at least (\S+) s at this rate.* at least (\S+) Hz", text).groups()
+        require_steady({"rate": rate, "longest_gap": float(least_gap)})
+        require_steady({"rate": float(least_rate), "longest_gap": gap})
+    else:
+        assert rate * gap > 1.99
