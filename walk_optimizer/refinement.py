@@ -32,11 +32,11 @@ FloatArray = NDArray[np.float64]
 
 _FEWEST_INTERVALS = 3
 _MOST_PHASES = 6
-_ROUNDS = 6
+_ROUNDS = 10
 # Single support needs up to 70 iterations from the report's grid. Contact phases that the continuous problem
 # does not have never converge, and take three times as long an iteration.
 _MOST_ITERATIONS = 200
-_MOST_ITERATIONS_OF_OTHER_PHASES = 80
+_MOST_ITERATIONS_OF_OTHER_PHASES = 120
 # Barrier parameter for a start from the report's grid, or from another refined solution.
 BARRIER = 1e-5
 
