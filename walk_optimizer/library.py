@@ -165,7 +165,6 @@ class GaitLibrary:
             raise GaitNotWritableError(
                 f"the gait is kept in memory only, and lost when this process ends: {error}"
             ) from error
-        self._serve(gait, path)
         self._unsaved.pop(path, None)
         self._problems = tuple(text for text in self._problems if not text.startswith(f"{path}:"))
         return path
