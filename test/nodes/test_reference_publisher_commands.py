@@ -11,7 +11,7 @@ pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Vector3
 from nodes.conftest import FAST, SLOW, stock
-from nodes.walking import NODE, Walker, assert_continuous
+from nodes.walking import NODE, assert_continuous, standing_walker
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -38,12 +38,8 @@ def publisher(start_for_module, other_walker, tmp_path_factory):
 @pytest.fixture
 def walker(graph, publisher):
     """A publisher that stands, and stands again after the test."""
-    walker = Walker(graph)
-    walker.wait_for("standing")
-    yield walker
-    walker.trigger("stop")
-    walker.wait_for("standing")
-    assert publisher.exit_code is None
+    with standing_walker(graph, publisher) as walker:
+        yield walker
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Vector3
 from nodes.graph import exists, workers_of
-from nodes.walking import MODE, NODE, Walker
+from nodes.walking import MODE, NODE, standing_walker
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
@@ -30,12 +30,8 @@ def publisher(start_for_module, tmp_path_factory):
 @pytest.fixture
 def walker(graph, publisher):
     """A publisher that stands, and stands again after the test."""
-    walker = Walker(graph)
-    walker.wait_for("standing")
-    yield walker
-    walker.trigger("stop")
-    walker.wait_for("standing")
-    assert publisher.exit_code is None
+    with standing_walker(graph, publisher) as walker:
+        yield walker
 
 
 def ask_for_a_solve(walker, publisher):

@@ -1,5 +1,7 @@
 """What tests of the publisher have in common: commands, and waiting for what they lead to."""
 
+from contextlib import contextmanager
+
 import numpy as np
 from nodes.graph import SETTLING
 from rclpy.qos import QoSProfile
@@ -58,6 +60,17 @@ class Walker:
         publisher = self.graph.publisher(kind, self.topic(name))
         self.graph.spin_for(SETTLING)
         return publisher
+
+
+@contextmanager
+def standing_walker(graph, publisher):
+    """Hand out a publisher that stands, and have it stand again afterwards."""
+    walker = Walker(graph)
+    walker.wait_for("standing")
+    yield walker
+    walker.trigger("stop")
+    walker.wait_for("standing")
+    assert publisher.exit_code is None
 
 
 def stamp_ns(message):

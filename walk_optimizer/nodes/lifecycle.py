@@ -30,8 +30,7 @@ from rclpy.lifecycle.node import LifecycleNodeMixin
 from walk_optimizer.errors import WalkOptimizerError
 from walk_optimizer.nodes.diagnostics import Finding, Level
 from walk_optimizer.nodes.parameters import Setting
-from walk_optimizer.nodes.remote_service import RemoteService
-from walk_optimizer.nodes.suite_node import Answer, SuiteNode
+from walk_optimizer.nodes.suite_node import SuiteNode
 
 AUTOSTART = Setting(
     "autostart",
@@ -103,25 +102,14 @@ class ManagedNode(LifecycleNodeMixin, SuiteNode):
         if self.state != _FINALIZED:
             self.trigger_shutdown()
 
-    def serve(self, kind: type, name: str, answer: Answer) -> None:
-        """Offer a service that refuses while the node is not active."""
+    def require_active(self) -> None:
+        """Refuse services and calls while the node is not active.
 
-        async def answer_if_active(request: Any, response: Any) -> None:
-            self._require_active()
-            await answer(request, response)
-
-        super().serve(kind, name, answer_if_active)
-
-    async def call(
-        self,
-        service: RemoteService,
-        request: Any,
-        timeout: float,
-        require_wanted: Callable[[], None] = lambda: None,
-    ) -> Any:
-        """Return the response of another node, while this one is active."""
-        self._require_active()
-        return await super().call(service, request, timeout, require_wanted)
+        Raises:
+            NotActiveError: says how to activate it.
+        """
+        if not self.active:
+            raise NotActiveError(f"{self.get_fully_qualified_name()} is {self.state}; {self._advice()}")
 
     def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Configure, or leave no trace."""
@@ -186,10 +174,6 @@ class ManagedNode(LifecycleNodeMixin, SuiteNode):
             self.get_logger().debug(f"no such transition while {self.state}: {error}")
             response.success = False
             return response
-
-    def _require_active(self) -> None:
-        if not self.active:
-            raise NotActiveError(f"{self.get_fully_qualified_name()} is {self.state}; {self._advice()}")
 
     def _end_work(self, reason: str) -> None:
         self.end_waits(NotActiveError(f"{self.get_fully_qualified_name()} {reason}"))

@@ -60,6 +60,13 @@ class SuiteNode(Node):
     def close(self) -> None:
         """Give back what the node holds beside ROS entities; called before it is destroyed."""
 
+    def require_active(self) -> None:
+        """Refuse to serve and to ask while the node must not: managed nodes do so, others are always active.
+
+        Raises:
+            WalkOptimizerError: says what would do.
+        """
+
     def serve(self, kind: type, name: str, answer: Answer) -> None:
         """Offer a service whose response has `success` and `message`.
 
@@ -72,6 +79,7 @@ class SuiteNode(Node):
         async def callback(request: Any, response: Any) -> Any:
             response.success = False
             try:
+                self.require_active()
                 await answer(request, response)
                 response.success = True
             except WalkOptimizerError as error:
@@ -136,6 +144,7 @@ class SuiteNode(Node):
         Raises:
             ServiceUnavailableError: nobody offers the service, or it went away, or gave no answer.
         """
+        self.require_active()
         if not await self._offered(service):
             raise ServiceUnavailableError(f"service {service.name} is not there; is its node running?")
         future = service.client.call_async(request)
