@@ -77,6 +77,10 @@ class JointLimits:
     torque: tuple[float, ...] = (math.inf,) * len(JOINTS)
     speed: tuple[float, ...] = (math.inf,) * len(JOINTS)
 
+    def lowered_from(self, former: "JointLimits") -> "JointLimits":
+        """Return those limits that are lower than former ones; the others are none."""
+        return JointLimits(_lower(self.torque, former.torque), _lower(self.speed, former.speed))
+
     def require(self, need: JointNeed) -> None:
         """Refuse steps that need more.
 
@@ -95,6 +99,10 @@ class JointLimits:
         ]
         if excesses:
             raise JointLimitError(f"{need.purpose}, {'; '.join(excesses)}")
+
+
+def _lower(limits: Sequence[float], former: Sequence[float]) -> tuple[float, ...]:
+    return tuple(new if new < old else math.inf for new, old in zip(limits, former, strict=True))
 
 
 def limits_of(values: Sequence[float]) -> tuple[float, ...]:

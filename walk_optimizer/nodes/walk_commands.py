@@ -90,12 +90,12 @@ class WalkCommands:
         return "" if self._order is None else str(self._order)
 
     def require_met(self, limits: JointLimits) -> None:
-        """Refuse limits that what is walked now, what is about to be, or its stop does not meet.
+        """Refuse to lower limits below what is walked now, what is about to be, or its stop needs.
 
         Raises:
             JointLimitError: says what for, names the joint and both numbers.
         """
-        self._needs.require(limits, self._stream.walk)
+        self._needs.require(limits.lowered_from(self.limits), self._stream.walk)
 
     async def walk_at(self, request: GaitRequest, wait_for_library: bool = False) -> str:
         """Have a gait walked, and return a sentence about it.
