@@ -281,6 +281,29 @@ def test_the_bag_holds_what_was_streamed(graph, publisher, tmp_path):
     assert any(streamed[offset : offset + len(kept)] == kept for offset in offsets)
 
 
+def test_what_the_node_records_itself_is_in_the_bag_once_though_it_is_asked_for_again(graph, start, tmp_path):
+    named = ["~/target_speed", "/robot/velocity", "reference_publisher/joint_reference"]
+    start(NODE, remaps={"~/cmd_vel": "/robot/velocity"}, recording_topics=named, **PATIENT)
+    joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
+    speeds, velocities = (
+        graph.publisher(kind, name)
+        for kind, name in ((Float64, f"{NODE}/target_speed"), (Twist, "/robot/velocity"))
+    )
+    graph.spin_until(lambda: joints, "references")
+    assert graph.call(StartRecording, f"{NODE}/start_recording", directory=str(tmp_path / "bag")).success
+    graph.spin_for(2.0)  # Topics are looked for every second.
+    for speed in (0.0, 99.0):
+        speeds.publish(Float64(data=speed))
+        velocities.publish(Twist(linear=Vector3(x=speed)))
+        graph.spin_for(SETTLING)
+    assert graph.call(StopRecording, f"{NODE}/stop_recording").success
+    bag = read_bag(tmp_path / "bag")
+    assert [message.data for message in bag[f"/{NODE}/target_speed"]] == [0.0, 99.0]
+    assert [message.linear.x for message in bag["/robot/velocity"]] == [0.0, 99.0]
+    stamps = [stamp_ns(message) for message in bag[f"/{NODE}/joint_reference"]]
+    assert len(stamps) == len(set(stamps)) > 100
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_closes_the_bag_and_leaves_cleanly(graph, publisher, tmp_path, number):
     joints = graph.subscribe(JointState, f"{NODE}/joint_reference")

@@ -62,16 +62,14 @@ class RecordedTopic:
         """Publish a message, and record the very same bytes.
 
         Args:
-            message: Of the topic's type.
+            message: Of the topic's type, or serialised.
             time_ns: When, by the node's clock, in [ns].
         """
         recorder = self._bag.recorder
-        if recorder is None:
-            self._publisher.publish(message)
-            return
-        data = serialize(message)
+        data = message if isinstance(message, bytes) else serialize(message)
         self._publisher.publish(data)
-        recorder.write(self.info.name, data, max(time_ns, 0))
+        if recorder is not None:
+            recorder.write(self.info.name, data, max(time_ns, 0))
 
 
 class ReceivedTopic:
@@ -83,10 +81,11 @@ class ReceivedTopic:
     def __init__(self, node: SuiteNode, subscription: Subscription, bag: "StreamBag") -> None:
         """Listen to what the subscription's callback is given."""
         self._node, self._bag = node, bag
-        self._info = topic_info(subscription.topic_name, subscription.msg_type, subscription.qos_profile)
+        self.info = topic_info(subscription.topic_name, subscription.msg_type, subscription.qos_profile)
         self._announced_to: Recorder | None = None
         self._deliver = subscription.callback
         subscription.callback = self._take
+        bag.received.append(self)
 
     def _take(self, message: Any) -> None:
         self._deliver(message)
@@ -97,13 +96,13 @@ class ReceivedTopic:
             recorder.add_topic(self._offered())
             self._announced_to = recorder
         now = self._node.get_clock().now().nanoseconds
-        recorder.write(self._info.name, serialize(message), max(now, 0))
+        recorder.write(self.info.name, serialize(message), max(now, 0))
 
     def _offered(self) -> TopicInfo:
         """Return the topic with what its publishers offer; if they have gone, with what is asked of them."""
-        publishers = self._node.get_publishers_info_by_topic(self._info.name)
+        publishers = self._node.get_publishers_info_by_topic(self.info.name)
         offered = tuple(qos_profile(publisher.qos_profile) for publisher in publishers)
-        return replace(self._info, qos=offered or self._info.qos)
+        return replace(self.info, qos=offered or self.info.qos)
 
 
 class StreamBag:
@@ -112,7 +111,8 @@ class StreamBag:
     `start` and `stop` wait for the disk: they are for one thread that has the time (`recording_control`).
 
     Attributes:
-        topics: What is recorded.
+        topics: What the node publishes and is recorded.
+        received: What it is sent and is recorded.
         recorder: The recording, also one that has ended by itself; None when there is none.
         error: Why the last bag could not be begun; None when it could.
     """
@@ -120,8 +120,14 @@ class StreamBag:
     def __init__(self) -> None:
         """Record nothing."""
         self.topics: list[RecordedTopic] = []
+        self.received: list[ReceivedTopic] = []
         self.recorder: Recorder | None = None
         self.error: RecordingError | None = None
+
+    @property
+    def names(self) -> set[str]:
+        """Full names of all these topics: nobody else needs to record them."""
+        return {topic.info.name for topic in (*self.topics, *self.received)}
 
     @property
     def recording(self) -> bool:

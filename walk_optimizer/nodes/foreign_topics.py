@@ -1,6 +1,6 @@
 """Topics of other nodes that go into the bag: found in the graph while a recording runs."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -28,16 +28,16 @@ class ForeignTopics:
         recorder: That gets them.
     """
 
-    def __init__(self, node: SuiteNode, names: Sequence[str], recorder: Recorder) -> None:
+    def __init__(self, node: SuiteNode, names: Iterable[str], recorder: Recorder) -> None:
         """Look for topics now, and again every second.
 
         Args:
             node: That subscribes.
-            names: Of topics, relative to the node's namespace or absolute.
+            names: Full names of topics.
             recorder: That was started.
         """
         self._node, self.recorder = node, recorder
-        self._missing = {str(node.resolve_topic_name(name)) for name in names}
+        self._missing = set(names)
         self._subscriptions: list[Subscription] = []
         self._timer = node.repeat(_LOOK_PERIOD, self._look)
         self._look()

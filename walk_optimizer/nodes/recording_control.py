@@ -144,7 +144,9 @@ class RecordingControl:
             self._foreign.close()
             self._foreign = None
         if recorder is not None and self._foreign is None:
-            self._foreign = ForeignTopics(self._node, self._node.parameters["recording_topics"], recorder)
+            named = self._node.parameters["recording_topics"]
+            names = {str(self._node.resolve_topic_name(name)) for name in named} - self._bag.names
+            self._foreign = ForeignTopics(self._node, names, recorder)
 
     def _tell_closed(self, status: RecorderStatus) -> None:
         self._node.get_logger().info(f"closed {status.directory} with {status.messages} messages")
