@@ -127,7 +127,8 @@ class StreamBag:
     @property
     def names(self) -> set[str]:
         """Full names of all these topics: nobody else needs to record them."""
-        return {topic.info.name for topic in (*self.topics, *self.received)}
+        infos = [one.info for one in self.topics] + [one.info for one in self.received]
+        return {info.name for info in infos}
 
     @property
     def recording(self) -> bool:
