@@ -1,6 +1,7 @@
 """Node `gait_optimizer`: solves for gaits in worker processes, by service and by action."""
 
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -25,7 +26,7 @@ from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.walker_setting import WALKER_FILE, walker_of
 from walk_optimizer.request import GaitRequest, gait_table_settings
 from walk_optimizer.solve.settings import solver_settings
-from walk_optimizer.solve.status import Progress, Status
+from walk_optimizer.solve.status import Progress, SolveReport, Status
 from walk_optimizer.solve.worker import WorkerPool
 from walk_optimizer.solve.worker_task import Ticket
 
@@ -62,6 +63,10 @@ def _settings() -> list[Setting]:
             read_only=True,
         ),
     ]
+
+
+class InternalError(WalkOptimizerError):
+    """Something that nobody foresaw ended a request."""
 
 
 class GaitOptimizerNode(SuiteNode):
@@ -102,9 +107,8 @@ class GaitOptimizerNode(SuiteNode):
         super().destroy_node()
 
     async def _answer(self, request: OptimizeGait.Request, response: OptimizeGait.Response) -> None:
-        with _refusal_reported(response):
-            ticket = submit_gait(self._pool, self._job(request))
-        await self._fill(response, ticket)
+        with self._reported(response):
+            await self._fill(response, submit_gait(self._pool, self._job(request)))
 
     def _job(self, request: Any) -> GaitJob:
         """Return the job of a service request or an action goal."""
@@ -136,7 +140,8 @@ class GaitOptimizerNode(SuiteNode):
     async def _execute(self, goal: ServerGoalHandle) -> OptimizeGaitAction.Result:
         result = OptimizeGaitAction.Result()
         try:
-            await self._pursue(goal, result)
+            with self._reported(result):
+                await self._pursue(goal, result)
             result.success = True
             goal.succeed()
         except WalkOptimizerError as error:
@@ -151,13 +156,12 @@ class GaitOptimizerNode(SuiteNode):
         Raises:
             WalkOptimizerError: there is no gait.
         """
-        with _refusal_reported(result):
-            job = self._job(goal.request)
+        job = self._job(goal.request)
 
-            def tell(progress: Progress) -> None:
-                goal.publish_feedback(progress_to_message(progress, job.time_limit))
+        def tell(progress: Progress) -> None:
+            goal.publish_feedback(progress_to_message(progress, job.time_limit))
 
-            ticket = submit_gait(self._pool, job, lambda progress: self.later(tell, progress))
+        ticket = submit_gait(self._pool, job, lambda progress: self.later(tell, progress))
         key = bytes(goal.goal_id.uuid)
         self._tickets[key] = ticket
         timer = self.repeat(_FEEDBACK_PERIOD, lambda: tell(ticket.progress))
@@ -175,15 +179,26 @@ class GaitOptimizerNode(SuiteNode):
             ticket.cancel()
         return CancelResponse.ACCEPT
 
+    @contextmanager
+    def _reported(self, answer: Any) -> Iterator[None]:
+        """Have the report of a service response or an action result say how it ended, whatever happened.
 
-@contextmanager
-def _refusal_reported(answer: Any) -> Iterator[None]:
-    """Have a service response or an action result say so when no solve starts."""
-    try:
-        yield
-    except WalkOptimizerError as error:
-        answer.report = refusal_to_message(error)
-        raise
+        Raises:
+            WalkOptimizerError: there is no gait.
+        """
+        try:
+            yield
+        except WalkOptimizerError as error:
+            if not answer.report.status:  # No solve was started.
+                answer.report = refusal_to_message(error)
+            raise
+        except Exception as error:
+            self.get_logger().error(f"a request failed: {traceback.format_exc()}")
+            text = f"internal error: {error!r}; the log of gait_optimizer tells where"
+            report = SolveReport(Status.SOLVER_ERROR, text, back_end="")
+            self._health.note(report)
+            answer.report = report_to_message(report)
+            raise InternalError(text) from error
 
 
 def main() -> int:
