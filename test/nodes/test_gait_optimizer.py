@@ -10,7 +10,6 @@ pytest.importorskip("rclpy")
 from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nodes.graph import assert_left_cleanly, children_of, exists, workers_of
-from rcl_interfaces.msg import Log
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from walk_optimizer_interfaces.action import OptimizeGait as OptimizeGaitAction
@@ -19,7 +18,6 @@ from walk_optimizer_interfaces.srv import OptimizeGait
 from walk_optimizer.background import GaitJob, submit_gait
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
-from walk_optimizer.nodes import gait_optimizer
 from walk_optimizer.nodes.gait_optimizer import GaitOptimizerNode
 from walk_optimizer.nodes.qos import SERVICE as SERVICE_QOS
 from walk_optimizer.request import GaitRequest
@@ -106,30 +104,6 @@ def test_refusals_say_what_the_core_says_and_the_node_lives_on(graph, optimizer)
     answer = graph.call(OptimizeGait, SERVICE, speed=SPEED, spring_mode="none", time_limit=-1.0)
     assert (answer.success, "time limit is -1 s" in answer.message) == (False, True)
     assert optimizer.exit_code is None
-
-
-def test_an_error_that_nobody_foresaw_has_a_status_and_a_traceback_in_the_log(graph, monkeypatch):
-    def broken(_future):
-        raise KeyError("a mistake in the program")
-
-    monkeypatch.setattr(gait_optimizer, "outcome_of", broken)
-    told = graph.subscribe(Log, "/rosout")
-    node = GaitOptimizerNode()
-    graph.executor.add_node(node)
-    try:
-        fields = {"speed": SPEED, "spring_mode": "none", "points": 20, "time_limit": 0.1}
-        answer = graph.call(OptimizeGait, SERVICE, **fields)
-        status, result = Goal(graph, **fields).result()
-        assert status == GoalStatus.STATUS_ABORTED
-        for one in (answer, result):
-            assert (one.success, one.report.status) == (False, "solver_error")
-            assert one.message.startswith("internal error: KeyError('a mistake in the program')")
-            assert one.report.message == one.message
-        graph.spin_until(lambda: sum("Traceback" in one.msg for one in told) == 2, "the tracebacks")
-    finally:
-        graph.executor.remove_node(node)
-        node.close()
-        node.destroy_node()
 
 
 def test_the_node_answers_during_a_solve_and_cancel_ends_the_worker(graph, optimizer):
