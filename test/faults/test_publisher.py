@@ -258,7 +258,7 @@ def test_a_solve_for_steps_may_lose_its_process_be_overtaken_and_end_with_the_no
     future, worker = solving.begin_solve()
     solving.trigger("stop")
     answer = graph.result(future)
-    assert (answer.success, answer.message) == (False, "a later command came first")
+    assert (answer.success, answer.message) == (False, "superseded by a newer command")
     joints = solving.listen(JointState, "joint_reference")
     _, worker = solving.begin_solve()
     mark = len(joints)

@@ -6,8 +6,9 @@ pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Vector3
-from nodes.graph import exists, workers_of
+from nodes.graph import SETTLING, exists, workers_of
 from nodes.walking import MODE, NODE, standing_walker
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
@@ -56,9 +57,41 @@ def test_stops_and_emergency_stops_end_the_command_under_way(graph, walker, publ
     workers = workers_of(publisher.process.pid)
     walker.trigger("stop")
     refused = graph.result(answer)
-    assert (refused.success, refused.message) == (False, "a later command came first")
+    assert (refused.success, refused.message) == (
+        False,
+        "superseded by a newer command",
+    )
     # Not one that was let run to its end: its process is gone.
     graph.spin_until(lambda: not any(exists(worker) for worker in workers), "the end of the worker")
+
+
+def test_of_two_clients_the_older_one_is_told_at_once_that_a_newer_command_counts(graph, walker, publisher):
+    walker.walk(SLOWEST)
+    answers = []
+    older = ask_for_a_solve(walker, publisher)
+    older.add_done_callback(answers.append)
+    other = Node("other_client")
+    graph.executor.add_node(other)
+    try:
+        client = other.create_client(SetGait, walker.topic("set_gait"))
+        graph.spin_until(client.service_is_ready, "the service")
+        graph.spin_for(SETTLING)
+        newer = client.call_async(SetGait.Request(speed=SLOW, spring_mode=MODE))
+        newer.add_done_callback(answers.append)
+        graph.spin_until(lambda: len(answers) == 2, "both answers")
+    finally:
+        graph.executor.remove_node(other)
+        other.destroy_node()
+    # The older one first: it waits neither for its own solve nor for the way of the newer one.
+    assert answers == [older, newer]
+    refused, accepted = older.result(), newer.result()
+    assert (refused.success, refused.message) == (
+        False,
+        "superseded by a newer command",
+    )
+    assert accepted.success, accepted.message
+    walker.wait_for("walking", SLOW)
+    assert not any(state.target_speed == pytest.approx(FASTEST) for state in walker.states)
 
 
 def test_an_emergency_stop_drops_a_gait_that_has_not_begun(graph, walker):

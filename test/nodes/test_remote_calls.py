@@ -6,6 +6,7 @@ pytest.importorskip("rclpy")
 
 from std_srvs.srv import Trigger
 
+from walk_optimizer.errors import WalkOptimizerError
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.walk_order import SupersededError
 
@@ -28,30 +29,52 @@ class Silent(SuiteNode):
         await self.sleep(FOREVER)
 
 
-def test_a_call_that_nobody_wants_any_more_ends_before_its_answer(graph):
-    silent, asking = Silent(), SuiteNode("asking", [])
-    for node in (silent, asking):
-        graph.executor.add_node(node)
-    reasons = []
+@pytest.fixture
+def asking(graph):
+    node = SuiteNode("asking", [])
+    graph.executor.add_node(node)
+    yield node
+    graph.executor.remove_node(node)
+    node.destroy_node()
 
-    def require_wanted():
-        if reasons:
-            raise SupersededError(reasons[0])
 
-    async def end_of_call():
-        service = asking.connect(Trigger, "/silent/ask")
+class Call:
+    """A call of a service that is superseded at some time."""
+
+    def __init__(self, graph, node, service):
+        self._reasons = []
+        self.task = graph.executor.create_task(self._end, node, service)
+
+    async def _end(self, node, service):
         try:
-            return await asking.call(service, Trigger.Request(), FOREVER, require_wanted)
-        except SupersededError as error:
+            return await node.call(node.connect(Trigger, service), Trigger.Request(), FOREVER, self._require)
+        except WalkOptimizerError as error:
             return error
 
-    call = graph.executor.create_task(end_of_call)
-    graph.spin_until(lambda: silent.asked or call.done(), "the question")
+    def _require(self):
+        if self._reasons:
+            raise SupersededError(self._reasons[0])
+
+    def supersede(self):
+        self._reasons.append("superseded")
+
+
+def test_a_call_that_nobody_wants_any_more_ends_before_its_answer(graph, asking):
+    silent = Silent()
+    graph.executor.add_node(silent)
+    call = Call(graph, asking, "/silent/ask")
+    graph.spin_until(lambda: silent.asked or call.task.done(), "the question")
     graph.spin_for(0.3)
-    assert not call.done()
-    reasons.append("a later command came first")
-    graph.spin_until(call.done, "the end of the wait")
-    assert isinstance(call.result(), SupersededError)
-    for node in (silent, asking):
-        graph.executor.remove_node(node)
-        node.destroy_node()
+    assert not call.task.done()
+    call.supersede()
+    assert isinstance(graph.result(call.task), SupersededError)
+    graph.executor.remove_node(silent)
+    silent.destroy_node()
+
+
+def test_a_call_that_nobody_wants_any_more_does_not_wait_for_a_service_that_may_still_come(graph, asking):
+    call = Call(graph, asking, "/nobody/ask")
+    graph.spin_for(0.3)
+    assert not call.task.done()
+    call.supersede()
+    assert isinstance(graph.result(call.task), SupersededError)

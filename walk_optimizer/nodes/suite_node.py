@@ -20,6 +20,8 @@ from walk_optimizer.nodes.remote_service import RemoteService, announce_life
 
 # How often a wait looks whether the other node still lives, in [s].
 _WATCH_PERIOD = 0.1
+# A service may not be known yet for that long, in [s].
+_DISCOVERY = 3.0
 
 Answer = Callable[[Any, Any], Awaitable[None]]
 
@@ -145,7 +147,7 @@ class SuiteNode(Node):
             ServiceUnavailableError: nobody offers the service, or it went away, or gave no answer.
         """
         self.require_active()
-        if not await self._offered(service):
+        if not await self._offered(service, require_wanted):
             raise ServiceUnavailableError(f"service {service.name} is not there; is its node running?")
         future = service.client.call_async(request)
         begin = self._wall.now()
@@ -175,11 +177,12 @@ class SuiteNode(Node):
         finally:
             self._waits.discard(future)
 
-    async def _offered(self, service: RemoteService, patience: float = 3.0) -> bool:
-        """Return whether a service is there, after giving discovery some time in [s]."""
-        for _ in range(round(patience / _WATCH_PERIOD)):
+    async def _offered(self, service: RemoteService, require_wanted: Callable[[], None]) -> bool:
+        """Return whether a service is there, after giving discovery some time."""
+        for _ in range(round(_DISCOVERY / _WATCH_PERIOD)):
             if service.available:
                 return True
+            require_wanted()
             await self.sleep(_WATCH_PERIOD)
         return service.available
 

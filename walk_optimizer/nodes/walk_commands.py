@@ -151,7 +151,7 @@ class WalkCommands:
 
     def supersede(self) -> None:
         """End what is under way: another command counts from now on."""
-        self._end_order("a later command came first")
+        self._end_order("superseded by a newer command")
 
     def give_up(self) -> None:
         """Let nothing begin any more that was asked for before an emergency stop, except a stop.
