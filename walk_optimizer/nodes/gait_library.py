@@ -241,13 +241,10 @@ class GaitLibraryNode(ManagedNode):
         return Finding(Level.OK, f"{len(entries)} gaits", values)
 
     def _optimizer_finding(self) -> Finding:
-        values = {"service": self._optimizer.name}
-        if self._optimizer.available:
-            return Finding(Level.OK, "the optimizer is there", values)
-        return Finding(
-            Level.WARN,
-            "the optimizer is not there: only gaits of the library can be had; start gait_optimizer",
-            values,
+        return self._optimizer.finding(
+            "optimizer",
+            "only gaits of the library can be had; start gait_optimizer, or set `optimizer_service` to its "
+            "service",
         )
 
 

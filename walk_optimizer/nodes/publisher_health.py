@@ -62,14 +62,10 @@ class PublisherHealth:
         return Finding(Level.OK, "no speed is refused")
 
     def _library_there(self) -> Finding:
-        values = {"service": self._library.name}
-        if self._library.available:
-            return Finding(Level.OK, "the library is there", values)
-        return Finding(
-            Level.WARN,
-            "the library is not there: no other gait can be walked, stops work; start gait_library, or set "
-            "`library_service` to its service",
-            values,
+        return self._library.finding(
+            "library",
+            "no other gait can be walked, stops work; start gait_library, or set `library_service` to its "
+            "service",
         )
 
     def _timing(self) -> Finding:

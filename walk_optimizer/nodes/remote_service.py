@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from std_msgs.msg import Empty
 
+from walk_optimizer.nodes.diagnostics import Finding, Level
 from walk_optimizer.nodes.qos import SERVICE
 
 # In [s]; much longer than a busy machine keeps the middleware's thread waiting.
@@ -64,6 +65,18 @@ class RemoteService:
     def available(self) -> bool:
         """Whether a node offers the service that is not known to be dead."""
         return bool(self.client.service_is_ready()) and not self._lost
+
+    def finding(self, noun: str, without_it: str) -> Finding:
+        """Return whether the service is there, for operators.
+
+        Args:
+            noun: What they call its node.
+            without_it: What can't be done while it is away, and what to do.
+        """
+        values = {"service": self.name}
+        if self.available:
+            return Finding(Level.OK, f"the {noun} is there", values)
+        return Finding(Level.WARN, f"the {noun} is not there: {without_it}", values)
 
     def _on_start(self, _message: Empty) -> None:
         """Note a node that has just started: its first assertion of liveliness takes seconds."""
