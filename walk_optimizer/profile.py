@@ -153,13 +153,9 @@ class RefinedProfile:
 
     def sample(self, time: float) -> StepSample:
         """Return the walker at a time in [s] from the start of the step, 0 <= time <= step_time."""
-        index, place = self._trajectory.locate(time)
-        q = self._trajectory.state(index, place)[:6]
-        qdot = self._trajectory.state_rate(index, place)[:6]
-        u = self._trajectory.torque(index, place)
-        for values in (q, qdot, u):
-            values.setflags(write=False)
-        return StepSample(q, qdot, u)
+        values = self._trajectory.motion(*self._trajectory.locate(time))
+        values.setflags(write=False)
+        return StepSample(values[:6], values[6:12], values[12:])
 
 
 def profile_of(gait: Gait) -> StepProfile:

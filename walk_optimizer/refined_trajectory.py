@@ -81,6 +81,15 @@ class RefinedTrajectory:
         coefficients: FloatArray = np.einsum("kj,njs->nks", NODE_COEFFICIENTS, self.forces)
         return coefficients
 
+    @cached_property
+    def _motion_polynomials(self) -> FloatArray:
+        """q, qdot and u side by side, (n, 4, 15): a fast loop evaluates all of them by one product."""
+        q = self._state_polynomials[:, :, :6]
+        qdot, u = np.zeros_like(q), np.zeros((self.intervals, 4, 3))
+        qdot[:, :3] = np.arange(1, 4)[:, None] * q[:, 1:] / self.lengths[:, None, None]
+        u[:, :3] = self._torque_polynomials
+        return np.concatenate([q, qdot, u], axis=2)
+
     def locate(self, time: float) -> tuple[int, float]:
         """Return the interval of a time in [s] and the place in it, in [0, 1]."""
         index = min(max(int(self.breaks.searchsorted(time, side="left")) - 1, 0), self.intervals - 1)
@@ -98,11 +107,11 @@ class RefinedTrajectory:
         )
         return values
 
-    def state_rate(self, index: int, place: float) -> FloatArray:
-        """Return the time derivative of the state polynomial, (12,)."""
-        powers = np.array([0.0, 1.0, 2 * place, 3 * place**2])
-        rate: FloatArray = powers @ self._state_polynomials[index] / float(self.lengths[index])
-        return rate
+    def motion(self, index: int, place: float) -> FloatArray:
+        """Return q, qdot (the derivative of the polynomial q) and u, (15,), at a place of an interval."""
+        powers = np.array([1.0, place, place**2, place**3])
+        values: FloatArray = powers @ self._motion_polynomials[index]
+        return values
 
     def torque(self, index: int, place: float) -> FloatArray:
         """Return u in [N m], (3,), at a place of an interval."""

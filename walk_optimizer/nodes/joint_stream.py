@@ -155,8 +155,8 @@ class JointStream:
         self._last_ns = now.nanoseconds
         # Counted from the begin: a float of the seconds since 1970 resolves a quarter microsecond.
         reference = self.walk.advance((now.nanoseconds - self._begin_ns) * 1e-9)
-        messages, stamp = self._messages, now.to_msg()
-        self._joints.publish(messages.joint_state(reference, stamp), now.nanoseconds)
+        messages = self._messages
+        self._joints.publish(messages.joint_state(reference, now.nanoseconds), now.nanoseconds)
         self._torques.publish(messages.torques(reference), now.nanoseconds)
         self._commands.publish(messages.commands(reference), now.nanoseconds)
         self._announce(now)

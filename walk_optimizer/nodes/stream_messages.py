@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
-from walk_optimizer.nodes.conversions import doubles
+from walk_optimizer.nodes.message_template import MessageTemplate
 from walk_optimizer.references import JOINTS, Reference
+
+FloatArray = NDArray[np.float64]
 
 TORQUES = ("u1", "u2", "u3")
 # Command interfaces of ros2_control; each is an attribute of a reference.
@@ -33,41 +36,39 @@ class StreamFormat:
 
 
 class StreamMessages:
-    """Makes the messages of one format; each is made once and filled again for every reference."""
+    """Makes the messages of one format, serialised."""
 
     def __init__(self, form: StreamFormat) -> None:
         """Prepare the messages."""
-        self._rows = [JOINTS.index(name) for name in form.joint_names]
-        self._torque_rows = [TORQUES.index(name) for name in form.torque_order]
+        self._rows = np.array([JOINTS.index(name) for name in form.joint_names])
+        self._torque_rows = np.array([TORQUES.index(name) for name in form.torque_order])
         self._interface = form.command_interface
-        self._joints = JointState(name=list(form.joint_names))
-        self._joints.header.frame_id = form.frame_id
+        joints = JointState(name=list(form.joint_names))
+        joints.header.frame_id = form.frame_id
+        self._joints = MessageTemplate(joints, ("position", "velocity", "effort"), len(form.joint_names))
         self._torques = _labelled(form.torque_order)
         self._commands = _labelled(form.joint_names)
 
-    def joint_state(self, reference: Reference, stamp: Any) -> JointState:
-        """Return positions, velocities and feed-forward torques of the joints."""
-        message = self._joints
-        message.header.stamp = stamp
-        message.position = doubles(reference.position[self._rows])
-        message.velocity = doubles(reference.velocity[self._rows])
-        message.effort = doubles(reference.effort[self._rows])
-        return message
+    def joint_state(self, reference: Reference, time_ns: int) -> bytes:
+        """Return positions, velocities and feed-forward torques of the joints at a time in [ns]."""
+        rows = self._rows
+        return self._joints.stamped(
+            time_ns, reference.position[rows], reference.velocity[rows], reference.effort[rows]
+        )
 
-    def torques(self, reference: Reference) -> Float64MultiArray:
+    def torques(self, reference: Reference) -> bytes:
         """Return the feed-forward torques u1, u2, u3."""
-        self._torques.data = doubles(reference.torques[self._torque_rows])
-        return self._torques
+        return self._torques.filled(reference.torques[self._torque_rows])
 
-    def commands(self, reference: Reference) -> Float64MultiArray:
+    def commands(self, reference: Reference) -> bytes:
         """Return one value for each joint, as forward_command_controller takes them."""
-        self._commands.data = doubles(getattr(reference, self._interface)[self._rows])
-        return self._commands
+        values: FloatArray = getattr(reference, self._interface)
+        return self._commands.filled(values[self._rows])
 
 
-def _labelled(names: Sequence[str]) -> Float64MultiArray:
+def _labelled(names: Sequence[str]) -> MessageTemplate:
     """Return an array whose layout names its elements."""
     size = len(names)
     message = Float64MultiArray()
     message.layout.dim = [MultiArrayDimension(label=",".join(names), size=size, stride=size)]
-    return message
+    return MessageTemplate(message, ("data",), size)

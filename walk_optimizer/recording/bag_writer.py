@@ -87,12 +87,12 @@ class BagWriter:
     @property
     def messages(self) -> int:
         """Messages in the bag; the open chunk is in it, unless a failed write has lost that."""
-        return self._count(self._file.entry if self._file else None)
+        return self._count(self._file.messages if self._file else 0)
 
     @property
     def stored_messages(self) -> int:
         """Messages that a crash of this process cannot take away."""
-        return self._count(self._file.stored if self._file else None)
+        return self._count(self._file.stored.message_count if self._file else 0)
 
     @property
     def size(self) -> int:
@@ -212,8 +212,8 @@ class BagWriter:
         except OSError as error:
             raise write_error(path, error) from error
 
-    def _count(self, current: FileEntry | None) -> int:
-        return sum(entry.message_count for entry in self._metadata(current).files)
+    def _count(self, in_open_file: int) -> int:
+        return sum(entry.message_count for entry in self._finished) + in_open_file
 
 
 def _create_directory(directory: Path) -> None:

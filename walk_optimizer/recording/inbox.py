@@ -10,20 +10,21 @@ class Inbox(Generic[Item]):
     """Takes items without ever waiting, and hands them over in whole batches.
 
     The lock is held for a few instructions only, whatever the disk does, and the taker empties the queue in
-    one exchange. No item wakes it, but callers with a period say when they rest: so one of 1 ms does not
-    notice it.
+    one exchange. No item wakes it, but callers with a period say when they rest, and once a batch has
+    gathered that does: so one of 1 ms does not notice it.
     """
 
-    def __init__(self, limit: int) -> None:
+    def __init__(self, limit: int, batch: int) -> None:
         """Create an open, empty queue.
 
         Args:
             limit: Items that may wait at the same time.
+            batch: So many are worth waking up for.
         """
-        self._limit = limit
+        self._limit, self._batch = limit, batch
         self._items: list[Item] = []
         self._rejected = 0
-        self._closed = threading.Event()
+        self._closed = False
         self._resting = threading.Event()
         self._lock = threading.Lock()
 
@@ -35,7 +36,7 @@ class Inbox(Generic[Item]):
     @property
     def closed(self) -> bool:
         """Whether the queue takes nothing any more."""
-        return self._closed.is_set()
+        return self._closed
 
     def __len__(self) -> int:
         """Items that wait."""
@@ -69,23 +70,21 @@ class Inbox(Generic[Item]):
 
     def rest(self) -> None:
         """Say that no items are offered for a moment."""
-        self._resting.set()
+        if len(self._items) >= self._batch:
+            self._resting.set()
 
-    def take(self, gathering: float, patience: float) -> tuple[list[Item], bool]:
-        """Let items gather, wait for a rest, and take all of them; if the queue is closed meanwhile, at once.
+    def take(self, patience: float) -> tuple[list[Item], bool]:
+        """Wait for a rest with a batch of items, and take all of them; if the queue is closed, at once.
 
         Args:
-            gathering: How long they gather in [s].
-            patience: Longest wait for a rest after that in [s].
+            patience: Longest wait in [s].
 
         Returns:
             The items in their order, maybe none; and whether the queue was closed by then, so that no
             further ones follow.
         """
-        self._closed.wait(gathering)
+        self._resting.wait(patience)
         self._resting.clear()
-        if not self.closed:
-            self._resting.wait(patience)
         with self._lock:
             items, self._items = self._items, []
             return items, self.closed
@@ -93,5 +92,5 @@ class Inbox(Generic[Item]):
     def close(self) -> None:
         """Take nothing any more; what waits can still be taken."""
         with self._lock:
-            self._closed.set()
+            self._closed = True
         self._resting.set()
