@@ -23,7 +23,7 @@ LAYERS = (
     ("guess", "starts"),
     ("solve",),
     ("gait", "refined_trajectory"),
-    ("certificate", "replay", "refined_certificate"),
+    ("certificate", "replay", "refined_certificate", "shadowing"),
     ("search", "optimizer", "reference_solve", "refinement", "mesh_adaptation", "resolve", "table_builder"),
     ("gait_files", "gait_csv"),
     (

@@ -14,6 +14,7 @@ from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.shadowing import with_replayable_start
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints, even_mesh, without_vanished
@@ -74,7 +75,8 @@ def refined_gait(gait: Gait, session: SolveSession) -> RefinedGait | None:
         gait: The gait on the report's grid.
         session: Clock, cancelling and progress.
     """
-    return certified_refinement(gait.walker, gait.request, refine(gait, session))
+    refined = certified_refinement(gait.walker, gait.request, refine(gait, session))
+    return None if refined is None else with_replayable_start(gait.walker, gait.request, refined)
 
 
 def certified_refinement(

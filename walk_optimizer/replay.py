@@ -24,6 +24,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _TOLERANCE = 1e-10  # of a step of the integrator, relative and in [rad], [m], [kg m/s]
+# What SciPy's integrators accept.
+_LEAST_RELATIVE_TOLERANCE = 100 * np.finfo(np.float64).eps
+_END = np.ones(1)
 # Feet that stand or slip are held on the surface that they are on: of the ground its slope counts.
 _ANY_TREAD = 1.0
 # A foot under load that moves no faster than this sticks, in [m/s].
@@ -81,11 +84,14 @@ def _replayed(
     trajectory: RefinedTrajectory,
     modes: Modes,
     indices: IntArray,
-    states: FloatArray,
+    starts: FloatArray,
+    places: FloatArray,
+    tolerance: float,
 ) -> FloatArray:
-    """Return the states (n, 12) at the ends of n intervals with the same modes.
+    """Return the states (n, m, 12) at m places of n intervals with the same modes.
 
-    All are integrated side by side from 0 to 1, each over its own length.
+    All are integrated side by side from 0 to 1, each over its own length. The states are infinite where
+    that does not come to an end.
     """
     # Here, not above: loading SciPy takes longer than all the rest of the optimiser.
     from scipy.integrate import solve_ivp
@@ -102,12 +108,20 @@ def _replayed(
         return (columns * lengths).T.ravel()
 
     # The integrator bounds the mean square of all errors, which may come from one interval alone.
-    tolerance = _TOLERANCE / np.sqrt(count)
+    tolerance /= np.sqrt(count)
     result = solve_ivp(
-        derivative, (0.0, 1.0), states.ravel(), method="DOP853", rtol=tolerance, atol=tolerance
+        derivative,
+        (0.0, 1.0),
+        starts.ravel(),
+        method="DOP853",
+        t_eval=places,
+        rtol=max(tolerance, _LEAST_RELATIVE_TOLERANCE),
+        atol=tolerance,
     )
-    ends: FloatArray = result.y[:, -1].reshape(count, 12)
-    return ends
+    if not result.success:
+        return np.full((count, places.size, 12), np.inf)
+    states: FloatArray = result.y.reshape(count, 12, places.size).transpose(0, 2, 1)
+    return states
 
 
 def contact_modes(walker: WalkerParameters, spring: KneeSpring, trajectory: RefinedTrajectory) -> list[Modes]:
@@ -132,6 +146,36 @@ def _mode(forces: FloatArray, slip: FloatArray) -> FootMode:
     return FootMode.SLIP_FORWARD if fastest > 0 else FootMode.SLIP_BACKWARD
 
 
+def interval_states(
+    walker: WalkerParameters,
+    spring: KneeSpring,
+    trajectory: RefinedTrajectory,
+    starts: FloatArray,
+    places: FloatArray = _END,
+    tolerance: float = _TOLERANCE,
+) -> FloatArray:
+    """Return where the torques of each interval lead from states of one or more walkers, (k, n, m, 12).
+
+    All take the same steps, so that differences of near-by starts are those of the motion itself.
+
+    Args:
+        walker: The walker.
+        spring: Its knee springs.
+        trajectory: The step: its torques, and which feet carry load.
+        starts: States at the start of each interval, (k, n, 12).
+        places: Where in the interval the states are wanted, in [0, 1], (m,).
+        tolerance: Of a step of the integrator, relative and in [rad], [m], [kg m/s].
+    """
+    modes = contact_modes(walker, spring, trajectory)
+    states = np.empty((*starts.shape[:2], places.size, 12))
+    for mode in dict.fromkeys(modes):
+        own = np.array([index for index, one in enumerate(modes) if one == mode])
+        indices = np.tile(own, len(starts))
+        ends = _replayed(walker, spring, trajectory, mode, indices, starts[:, own], places, tolerance)
+        states[:, own] = ends.reshape(len(starts), own.size, places.size, 12)
+    return states
+
+
 def interval_errors(
     walker: WalkerParameters, spring: KneeSpring, trajectory: RefinedTrajectory
 ) -> FloatArray:
@@ -139,25 +183,34 @@ def interval_errors(
 
     Each interval is replayed from its own start.
     """
-    modes = contact_modes(walker, spring, trajectory)
-    ends = np.empty_like(trajectory.states[:, 0])
-    for mode in dict.fromkeys(modes):
-        indices = np.array([index for index, one in enumerate(modes) if one == mode])
-        ends[indices] = _replayed(walker, spring, trajectory, mode, indices, trajectory.states[indices, 0])
+    ends = interval_states(walker, spring, trajectory, trajectory.states[None, :, 0])[0, :, 0]
     errors: FloatArray = np.abs(ends - trajectory.states[:, -1])[:, :6].max(axis=1)
     return errors
 
 
-def replay_step(walker: WalkerParameters, spring: KneeSpring, trajectory: RefinedTrajectory) -> FloatArray:
+def replay_step(
+    walker: WalkerParameters,
+    spring: KneeSpring,
+    trajectory: RefinedTrajectory,
+    tolerance: float = _TOLERANCE,
+) -> FloatArray:
     """Return the state (12,) at the end of the step when its torques are replayed from its start.
 
     Nothing is corrected on the way. At an impact inside the step the momentum jumps by J' impulse,
     as it does in the solution.
     """
     state: FloatArray = trajectory.states[0, 0]
+    jumps = inner_jumps(trajectory)
     for index, modes in enumerate(contact_modes(walker, spring, trajectory)):
-        jump = trajectory.states[index, 0] - trajectory.states[index - 1, -1]
-        if index and trajectory.impulses[index].any():
-            state = state + jump
-        state = _replayed(walker, spring, trajectory, modes, np.array([index]), state[None])[0]
+        state, one = state + jumps[index], np.array([index])
+        state = _replayed(walker, spring, trajectory, modes, one, state[None], _END, tolerance)[0, 0]
     return state
+
+
+def inner_jumps(trajectory: RefinedTrajectory) -> FloatArray:
+    """Return by how much the states jump before each interval, (n, 12): at impacts inside the step."""
+    jumps: FloatArray = np.zeros_like(trajectory.states[:, 0])
+    for index in range(1, trajectory.intervals):
+        if trajectory.impulses[index].any():
+            jumps[index] = trajectory.states[index, 0] - trajectory.states[index - 1, -1]
+    return jumps

@@ -54,10 +54,12 @@ def assert_joints_are_continuous(transition: Transition) -> None:
         profile = RefinedProfile.of(step)
         seen.append((profile.sample(0.0), profile.sample(profile.step_time), number))
     seen.append((begun(transition.target), begun(transition.target), seen[-1][2] + 1))
-    for (_, before, one), (after, _, other) in pairwise(seen):
+    # Gaits begin where a replay of their torques does best, as close to where they end as certified.
+    tolerances = [*[1e-8] * len(transition.steps), 1e-6]
+    for ((_, before, one), (after, _, other)), tolerance in zip(pairwise(seen), tolerances, strict=True):
         left = make_reference(before, one, 0.0, 0.0)
         right = make_reference(after, other, 0.0, 0.0)
-        np.testing.assert_allclose(left.position, right.position, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(left.position, right.position, rtol=0, atol=tolerance)
 
 
 @given(data=st.data())
