@@ -22,7 +22,7 @@ LAYERS = (
     ("transcription",),
     ("guess", "starts"),
     ("solve",),
-    ("gait", "refined_trajectory"),
+    ("gait", "refined_trajectory", "refined_peaks"),
     ("certificate", "replay", "refined_certificate", "shadowing"),
     ("search", "optimizer", "reference_solve", "refinement", "mesh_adaptation", "resolve", "table_builder"),
     ("gait_files", "gait_csv"),

@@ -5,12 +5,17 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walk_optimizer.errors import ConfigurationError, WalkOptimizerError
-from walk_optimizer.profile import StepProfile
+from walk_optimizer.gait import Gait, RefinedGait
+from walk_optimizer.profile import RefinedProfile, StepProfile, profile_of
 from walk_optimizer.references import EXCHANGED_JOINTS, JOINTS, cycle_reference
+from walk_optimizer.refined_peaks import speed_peaks, torque_peaks
 
-# Of a step: so fine that the polynomials of a step peak less than a part in a thousand higher between.
+FloatArray = NDArray[np.float64]
+
+# Of a step that is blended, or a stand.
 _SAMPLES = 400
 # What rounding may add.
 _TOLERANCE = 1e-9
@@ -32,16 +37,44 @@ class JointPeaks:
     torque: tuple[float, ...]
     speed: tuple[float, ...]
 
+    def __or__(self, other: "JointPeaks") -> "JointPeaks":
+        """Return the most that either needs."""
+        return JointPeaks(
+            tuple(map(max, self.torque, other.torque)), tuple(map(max, self.speed, other.speed))
+        )
 
-def peaks_of(steps: Iterable[StepProfile]) -> JointPeaks:
-    """Return the most that steps need: a joint may be in the stance leg or in the swing leg of each."""
+
+def peaks_of_solved(steps: Iterable[RefinedGait]) -> JointPeaks:
+    """Return the most that solved steps need, between their nodes too."""
+    trajectories = [step.trajectory for step in steps]
+    hip, *knees = np.max([torque_peaks(one) for one in trajectories], axis=0)
+    speed = np.max([speed_peaks(one) for one in trajectories], axis=0)
+    return _of_either_leg(np.array([hip, knees[0], hip, knees[1]]), speed)
+
+
+def peaks_of_gait(gait: Gait) -> JointPeaks:
+    """Return the most that a gait needs as it is walked (`profile_of`)."""
+    profile = profile_of(gait)
+    if gait.refined is not None and isinstance(profile, RefinedProfile):
+        return peaks_of_solved([gait.refined])
+    # On the report's grid torques and velocities are constant in each interval: their middles, and the ends.
+    return peaks_of([profile], 2 * gait.trajectory.points + 1)
+
+
+def peaks_of(steps: Iterable[StepProfile], samples: int = _SAMPLES) -> JointPeaks:
+    """Return the most that steps need at so many times of each."""
     torque, speed = np.zeros(len(JOINTS)), np.zeros(len(JOINTS))
     for step in steps:
         duration = step.step_time if math.isfinite(step.step_time) else 0.0
-        for time in np.linspace(0.0, duration, _SAMPLES).tolist():
+        for time in np.linspace(0.0, duration, samples).tolist():
             reference = cycle_reference(step, time)
             torque = np.maximum(torque, np.abs(reference.effort))
             speed = np.maximum(speed, np.abs(reference.velocity))
+    return _of_either_leg(torque, speed)
+
+
+def _of_either_leg(torque: FloatArray, speed: FloatArray) -> JointPeaks:
+    """Return peaks of `JOINTS`, (4,) each: a joint may be in the stance leg or in the swing leg of a step."""
     exchanged = [JOINTS.index(name) for name in EXCHANGED_JOINTS]
     torque, speed = (np.maximum(peaks, peaks[exchanged]) for peaks in (torque, speed))
     return JointPeaks(tuple(torque.tolist()), tuple(speed.tolist()))
@@ -58,11 +91,6 @@ class JointNeed:
 
     purpose: str
     peaks: JointPeaks
-
-    @classmethod
-    def of(cls, purpose: str, steps: Iterable[StepProfile]) -> "JointNeed":
-        """Return what steps need."""
-        return cls(purpose, peaks_of(steps))
 
 
 @dataclass(frozen=True)

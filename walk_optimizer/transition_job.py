@@ -59,8 +59,8 @@ def transition_job(job: TransitionJob, progress: ProgressCallback) -> Transition
 def planned(job: TransitionJob, progress: ProgressCallback | None = None) -> TransitionAnswer:
     """Return solved steps of the table, or solve and keep them."""
     table = TransitionTable(job.source.walker, job.folder)
-    known = table.find(job.source, job.target)
-    if known is not None and known.peak_torques.max() <= job.torque_limit:
+    known = table.find(job.source, job.target, job.torque_limit)
+    if known is not None:
         return TransitionAnswer(known.steps, "from the table")
     outcome = plan_transition(
         job.source.walker,

@@ -14,7 +14,7 @@ from walk_optimizer_interfaces.msg import Gait, SolverReport
 from walk_optimizer.errors import GaitFileError
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.conversions import gait_from_message, gait_to_message, request_of_message
-from walk_optimizer.nodes.streamed_gait import StreamedGait
+from walk_optimizer.nodes.streamed_gait import ReceivedGait
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 
 MODE = "stiffness_and_equilibrium"
@@ -73,11 +73,11 @@ def test_a_refined_part_that_does_not_fit_is_refused(change, problem):
     message = gait_to_message(with_refinement(made_up_gait()))
     change(message.refined[0])
     with pytest.raises(GaitFileError) as error:
-        StreamedGait.from_message(message, WalkerParameters())
+        ReceivedGait.from_message(message, WalkerParameters())
     assert problem in str(error.value)
 
 
 def test_what_is_streamed_is_refined_only_where_that_is_certified():
     gaits = (with_refinement(made_up_gait(), certified=certified) for certified in (True, False))
-    streamed = [StreamedGait.from_message(gait_to_message(gait), WalkerParameters()) for gait in gaits]
+    streamed = [ReceivedGait.from_message(gait_to_message(gait), WalkerParameters()) for gait in gaits]
     assert [str(one) for one in streamed] == ["0.3185 m/s (radau)", "0.3185 m/s (implicit_euler)"]

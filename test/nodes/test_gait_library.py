@@ -14,7 +14,7 @@ from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.conversions import trajectory_from_message
 from walk_optimizer.nodes.qos import LATCHED
-from walk_optimizer.nodes.streamed_gait import StreamedGait
+from walk_optimizer.nodes.streamed_gait import ReceivedGait
 from walk_optimizer.request import GaitRequest
 
 pytestmark = pytest.mark.ros
@@ -55,7 +55,7 @@ def test_any_speed_is_blended_within_bounds_and_the_answer_says_so(graph, start,
     assert (answer.success, answer.source, answer.gait.method) == (True, "interpolated", "interpolated")
     assert answer.gait.speed == pytest.approx(printed, abs=1e-6)
     assert "0.3194 m/s asked for, 0.3194 m/s delivered: interpolated between 0.3185 and" in answer.message
-    streamed = StreamedGait.from_message(answer.gait, WalkerParameters.from_yaml())
+    streamed = ReceivedGait.from_message(answer.gait, WalkerParameters.from_yaml())
     assert streamed.profile.step_length / streamed.profile.step_time == pytest.approx(printed, abs=1e-6)
     assert graph.call(GetGait, GET, speed=printed, spring_mode=MODE).gait == answer.gait
     near = graph.call(GetGait, GET, speed=printed, spring_mode=MODE, selection="nearest")

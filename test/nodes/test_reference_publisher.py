@@ -28,7 +28,7 @@ from walk_optimizer.cli.processes import NodeProcess
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.qos import LATCHED
-from walk_optimizer.nodes.streamed_gait import StreamedGait
+from walk_optimizer.nodes.streamed_gait import ReceivedGait
 from walk_optimizer.recording import describe_bag
 from walk_optimizer.reference_check import CycleMatcher
 from walk_optimizer.references import JOINTS
@@ -70,7 +70,7 @@ def stamp_ns(message):
 
 
 def matcher_of(gait):
-    return CycleMatcher(StreamedGait.from_message(gait, WalkerParameters()).profile)
+    return CycleMatcher(ReceivedGait.from_message(gait, WalkerParameters()).profile)
 
 
 def match(matcher, message):

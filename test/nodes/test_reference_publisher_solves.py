@@ -151,7 +151,7 @@ def limit(graph):
 
 
 def test_limits_hold_for_the_steps_to_a_gait_and_for_those_that_stop_it(walker, limit):
-    # In rad/s at the most: FASTER 7.9, its stop 10.52; MEDIUM 4.9, its stop 6.6, its start 9.68.
+    # In rad/s at the most: FASTER 7.9, its stop 10.52; MEDIUM 4.9, its stop 6.6, its start 9.70.
     assert limit("joint_speed_limits", 10.2).successful
     answer = walker.set_gait(FASTER)
     assert not answer.success
@@ -159,22 +159,22 @@ def test_limits_hold_for_the_steps_to_a_gait_and_for_those_that_stop_it(walker, 
     assert limit("joint_speed_limits", 9.0).successful
     answer = walker.set_gait(MEDIUM)
     assert not answer.success
-    assert "to get to 0.5344 m/s, left_knee needs 9.681 rad/s, its limit is 9 rad/s" in answer.message
+    assert "to get to 0.5344 m/s, left_knee needs 9.697 rad/s, its limit is 9 rad/s" in answer.message
     assert walker.states[-1].state == "standing"
 
 
 def test_limits_are_not_lowered_below_what_is_about_to_be_walked_or_its_stop_needs(graph, walker, limit):
-    # In N m at the most: MEDIUM 3.8, its stop 11.4, its start 24.7.
+    # In N m at the most: MEDIUM 3.8, its stop 11.4, its start 24.8.
     walker.trigger("pause")
     assert walker.set_gait(MEDIUM).success
     refused = limit("joint_torque_limits", 15.0)
     assert not refused.successful
-    assert "to get to 0.5344 m/s, left_knee needs 24.69 N m, its limit is 15 N m" in refused.reason
+    assert "to get to 0.5344 m/s, left_knee needs 24.79 N m, its limit is 15 N m" in refused.reason
     walker.trigger("resume")
     walker.wait_for("walking", MEDIUM)
-    refused = limit("joint_torque_limits", 10.0)
+    refused = limit("joint_torque_limits", 11.0)
     assert not refused.successful
-    assert "to stop from 0.5344 m/s, left_knee needs 11.44 N m, its limit is 10 N m" in refused.reason
+    assert "to stop from 0.5344 m/s, left_knee needs 11.44 N m, its limit is 11 N m" in refused.reason
     assert limit("joint_torque_limits", 15.0).successful
 
 

@@ -7,7 +7,12 @@ pytest.importorskip("rclpy")
 
 from nodes.conftest import stock
 from nodes.walking import NODE, Walker, assert_continuous, stamp_ns
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
+from walk_optimizer_interfaces.srv import GetGait
+
+from walk_optimizer.nodes import transition_planner
+from walk_optimizer.nodes.reference_publisher import ReferencePublisherNode
 
 pytestmark = pytest.mark.ros
 
@@ -16,7 +21,7 @@ SLOW_TABLE, FASTER_TABLE = 0.25 / 0.785, 0.30 / 0.72
 
 def test_it_starts_speeds_up_and_stops_by_certified_steps(graph, start, tmp_path):
     start("gait_library", cache_folder=tmp_path)
-    publisher = start(NODE, cache_folder=tmp_path, rate=200.0, longest_gap=10.0)
+    start(NODE, cache_folder=tmp_path, rate=200.0, longest_gap=10.0)
     walker = Walker(graph)
     walker.wait_for("standing")
     joints = walker.listen(JointState, "joint_reference")
@@ -35,8 +40,32 @@ def test_it_starts_speeds_up_and_stops_by_certified_steps(graph, start, tmp_path
     assert seconds > 1.2
     assert stamp_ns(joints[-1]) > stamp_ns(joints[0])
     assert np.abs([joint.effort for joint in joints]).max() < 30
-    # The steps that stop a gait are known before it is begun.
-    assert "blends, to stop at once" not in publisher.output()
+
+
+def test_a_gait_is_stopped_by_the_steps_that_it_was_begun_with(graph, start, tmp_path, monkeypatch):
+    """Whatever has been planned since, and however steps are planned by now."""
+    monkeypatch.setattr(transition_planner, "_KEPT", 1)
+    start("gait_library", cache_folder=tmp_path)
+    graph.client(GetGait, "gait_library/get_gait")
+    node = ReferencePublisherNode()
+    node.begin()
+    graph.executor.add_node(node)
+    try:
+        graph.set_parameters(NODE, Parameter("longest_gap", value=10.0), Parameter("rate", value=200.0))
+        walker = Walker(graph)
+        walker.wait_for("standing")
+        for transitions in ("certified", "blended"):
+            walker.walk(SLOW_TABLE)
+            assert graph.set_parameters(NODE, Parameter("transitions", value=transitions))[0].successful
+            walker.trigger("stop")
+            walker.wait_for("standing")
+            begun = next(one for one in reversed(walker.states) if one.state == "stopping")
+            # Certified steps to a stand are two, a blended one is one.
+            assert walker.states[-1].step - begun.step == 2
+    finally:
+        graph.executor.remove_node(node)
+        node.close()
+        node.destroy_node()
 
 
 def test_what_has_no_certified_steps_is_refused_and_the_stand_goes_on(graph, start, other_walker, tmp_path):

@@ -122,8 +122,12 @@ def test_one_step_keeps_its_torque_limit(walker, gaits):
     slow, faster = gaits[SpringMode.NONE][:2]
     outcome = plan_transition(walker, slow, faster, steps=1, torque_limit=20.0)
     assert outcome.transition is not None
-    assert outcome.transition.peak_torques.max() <= 20.0 + 1e-6
     assert outcome.transition.certificate.certified
+    # Streamed at whatever rate, not only at the nodes of the solve.
+    (step,) = outcome.transition.steps
+    places = np.linspace(0, 1, 50)
+    torques = [step.trajectory.torque(k, s) for k in range(step.trajectory.intervals) for s in places]
+    assert 19.5 < np.abs(torques).max() <= 20.0
 
 
 def test_torques_that_are_too_small_for_it_end_in_a_status_with_a_reason(walker, stand, gaits):

@@ -21,7 +21,7 @@ from walk_optimizer.gait import Gait
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.conversions import gait_from_message
 from walk_optimizer.nodes.qos import LATCHED, STREAM
-from walk_optimizer.nodes.streamed_gait import StreamedGait
+from walk_optimizer.nodes.streamed_gait import ReceivedGait
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
 from walk_optimizer.reference_check import CycleMatcher
 from walk_optimizer.references import JOINTS
@@ -154,7 +154,7 @@ class DemoClient:
 
 def compare(references: list[JointState], message: GaitMessage, walker: WalkerParameters) -> Reception:
     """Return how far received references are from a gait; names decide which joint is which."""
-    matcher = CycleMatcher(StreamedGait.from_message(message, walker).profile)
+    matcher = CycleMatcher(ReceivedGait.from_message(message, walker).profile)
     matches = []
     for reference in references:
         rows = [list(reference.name).index(joint) for joint in JOINTS]

@@ -8,16 +8,18 @@ from walk_optimizer_interfaces.msg import SolverReport
 
 from walk_optimizer.errors import SolveFailedError
 from walk_optimizer.gait import Gait
+from walk_optimizer.joint_limits import JointPeaks
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.nodes.conversions import gait_from_message, request_of_message
 from walk_optimizer.profile import RefinedProfile, StepProfile, profile_of
 from walk_optimizer.solve.status import Status
 from walk_optimizer.stand import StandProfile
 from walk_optimizer.transition.paces import Pace
+from walk_optimizer.walk import StepPlan
 
 
 @dataclass(frozen=True, eq=False)
-class StreamedGait:
+class ReceivedGait:
     """A gait that came as a message.
 
     Attributes:
@@ -31,7 +33,7 @@ class StreamedGait:
     gait: Gait
 
     @classmethod
-    def from_message(cls, message: GaitMessage, walker: WalkerParameters) -> "StreamedGait":
+    def from_message(cls, message: GaitMessage, walker: WalkerParameters) -> "ReceivedGait":
         """Return the gait of a message; its refined part is walked if that is certified.
 
         Args:
@@ -68,7 +70,38 @@ class StreamedGait:
 
 
 # What a walk is to lead to.
-Goal: TypeAlias = StreamedGait | StandProfile
+Goal: TypeAlias = ReceivedGait | StandProfile
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """Steps from one pace to another.
+
+    Attributes:
+        plan: The steps.
+        leads_to: The pace that follows them.
+        peaks: The most that the steps need of the joints.
+    """
+
+    plan: StepPlan
+    leads_to: Goal
+    peaks: JointPeaks
+
+
+@dataclass(frozen=True, eq=False)
+class StreamedGait(ReceivedGait):
+    """A gait that may be walked, for it is known how it is stopped.
+
+    Attributes:
+        stop: The way to a stand: planned before the gait is begun and kept with it, a stop waits for nothing.
+    """
+
+    stop: Way
+
+    @classmethod
+    def of(cls, gait: ReceivedGait, stop: Way) -> "StreamedGait":
+        """Return a gait with its stop."""
+        return cls(gait.message, gait.profile, gait.gait, stop)
 
 
 def profile_of_goal(goal: Goal) -> StepProfile:

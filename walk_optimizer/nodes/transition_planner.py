@@ -1,6 +1,5 @@
 """Plans the steps between paces in a process of its own: they may take long, and the stream never waits."""
 
-import contextlib
 from collections import OrderedDict
 from pathlib import Path
 from typing import TypeAlias
@@ -11,10 +10,10 @@ from walk_optimizer.blending import blended
 from walk_optimizer.errors import InvalidRequestError, SolveFailedError, WalkOptimizerError
 from walk_optimizer.gait import RefinedGait
 from walk_optimizer.gait_files.access import writable_folder
-from walk_optimizer.joint_limits import peaks_of
+from walk_optimizer.joint_limits import peaks_of, peaks_of_solved
 from walk_optimizer.model.parameters import KneeSpring
 from walk_optimizer.nodes.publisher_settings import BLENDED
-from walk_optimizer.nodes.streamed_gait import Goal, pace_of_goal, profile_of_goal
+from walk_optimizer.nodes.streamed_gait import Goal, Way, pace_of_goal, profile_of_goal
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.walker_setting import walker_of
 from walk_optimizer.profile import RefinedProfile
@@ -30,9 +29,6 @@ from walk_optimizer.walk import StepPlan
 # Transitions that are kept in memory; they take about 100 kB each.
 _KEPT = 64
 _WORKERS = 1
-# A solve bounds the torques at its nodes. Between them, the polynomials of the packaged transitions are up to
-# a tenth higher, where a step begins.
-_OVERSHOOT = 0.1
 # Names, knee springs and states of both ends.
 _Ends: TypeAlias = tuple[tuple[str, KneeSpring, bytes], ...]
 
@@ -75,7 +71,7 @@ class TransitionPlanner:
         if self._ticket is not None:
             self._ticket.cancel()
 
-    async def plan(self, begins: Goal, leads_to: Goal, torque_limit: float) -> StepPlan:
+    async def plan(self, begins: Goal, leads_to: Goal, torque_limit: float) -> Way:
         """Return the steps from one pace to another.
 
         Args:
@@ -87,7 +83,9 @@ class TransitionPlanner:
             NoTransitionError: certified steps are wanted, and there are none.
         """
         if self._node.parameters["transitions"] == BLENDED:
-            return blended(profile_of_goal(begins), profile_of_goal(leads_to))
+            plan = blended(profile_of_goal(begins), profile_of_goal(leads_to))
+            # Sampled. Torques, which may peak between the samples, are those of the pace that follows.
+            return Way(plan, leads_to, peaks_of(plan.steps))
         try:
             steps = await self._steps(begins, leads_to, torque_limit)
         except (InvalidRequestError, SolveFailedError, BusyError) as error:
@@ -96,20 +94,9 @@ class TransitionPlanner:
                 f"no certified steps from {_name(begins)} to {_name(leads_to)}{within}: {error}; "
                 "try a nearer speed, or set transitions to blended"
             ) from error
-        return _plan(begins, leads_to, steps)
-
-    def plan_at_once(self, begins: Goal, leads_to: Goal) -> StepPlan:
-        """Return steps that are known already, or blended ones: for stops, which wait for nothing."""
-        wanted = self._node.parameters["transitions"] != BLENDED
-        # A gait that is not refined may have been begun while blended steps were wanted.
-        with contextlib.suppress(InvalidRequestError):
-            steps = self._known.get(_ends(begins, leads_to))
-            if wanted and steps is not None:
-                return _plan(begins, leads_to, steps)
-        if wanted:
-            names = f"from {_name(begins)} to {_name(leads_to)}"
-            self._node.get_logger().warning(f"no certified steps {names} are known: blends, to stop at once")
-        return blended(profile_of_goal(begins), profile_of_goal(leads_to))
+        profiles = tuple(RefinedProfile.of(step) for step in steps)
+        plan = StepPlan(profile_of_goal(begins), profiles, profile_of_goal(leads_to))
+        return Way(plan, leads_to, peaks_of_solved(steps))
 
     async def _steps(self, begins: Goal, leads_to: Goal, torque_limit: float) -> tuple[RefinedGait, ...]:
         """Return certified steps.
@@ -121,7 +108,7 @@ class TransitionPlanner:
         """
         ends = _ends(begins, leads_to)
         steps = self._known.get(ends)
-        if steps is None or _peak_torque(steps) > torque_limit:
+        if steps is None or max(peaks_of_solved(steps).torque) > torque_limit:
             steps = self._known[ends] = await self._solve(begins, leads_to, torque_limit)
         self._known.move_to_end(ends)
         while len(self._known) > _KEPT:
@@ -134,7 +121,7 @@ class TransitionPlanner:
         job = TransitionJob(
             source=source,
             target=target,
-            torque_limit=torque_limit * (1 - _OVERSHOOT),
+            torque_limit=torque_limit,
             time_limit=limit,
             folder=Path(folder) if folder else None,
         )
@@ -162,20 +149,10 @@ def _ends(begins: Goal, leads_to: Goal) -> _Ends:
     )
 
 
-def _peak_torque(steps: tuple[RefinedGait, ...]) -> float:
-    """Return the largest torque of steps in [N m], between their nodes too."""
-    return max(peaks_of(RefinedProfile.of(step) for step in steps).torque)
-
-
 def _paces(begins: Goal, leads_to: Goal) -> tuple[Pace, Pace]:
     """Return what a solve leads from and to; a stand is left with the knee springs of what follows."""
     source, target = pace_of_goal(begins), pace_of_goal(leads_to)
     return (source.on(spring_of(target)) if isinstance(source, Standing) else source), target
-
-
-def _plan(begins: Goal, leads_to: Goal, steps: tuple[RefinedGait, ...]) -> StepPlan:
-    profiles = tuple(RefinedProfile.of(step) for step in steps)
-    return StepPlan(profile_of_goal(begins), profiles, profile_of_goal(leads_to))
 
 
 def _name(goal: Goal) -> str:

@@ -3,17 +3,16 @@
 from walk_optimizer_interfaces.srv import GetGait
 
 from walk_optimizer.errors import GaitNotFoundError, WalkOptimizerError
-from walk_optimizer.joint_limits import JointLimits, JointNeed
+from walk_optimizer.joint_limits import JointLimits, JointNeed, JointPeaks, peaks_of, peaks_of_gait
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.lifecycle import ManagedNode
 from walk_optimizer.nodes.remote_service import RemoteService
-from walk_optimizer.nodes.streamed_gait import StreamedGait
+from walk_optimizer.nodes.streamed_gait import ReceivedGait, StreamedGait, profile_of_goal
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
 from walk_optimizer.nodes.transition_planner import TransitionPlanner
 from walk_optimizer.nodes.walk_order import WalkOrder
 from walk_optimizer.phase_clock import Motion
-from walk_optimizer.profile import StepProfile
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.stand import StandProfile
 from walk_optimizer.transition.settings import transition_settings
@@ -79,7 +78,7 @@ class WalkCommands:
             JointLimitError: the joints can't even stand.
         """
         stand = StandProfile(self._standing)
-        standing = self._needed(_TO_STAND, stand)
+        standing = self._needed(_TO_STAND, peaks_of([stand]))
         self._needs = WalkNeeds(stand, PaceNeeds((standing,)))
         self.refusal = ""
         return stand
@@ -124,11 +123,11 @@ class WalkCommands:
     async def _carry_out(self, request: GaitRequest, order: WalkOrder, wait_for_library: bool) -> str:
         gait, source = await self._fetch(request, order, wait_for_library)
         order.require_valid()
-        keeping = self._needed(f"to walk at {gait.speed:.4f} m/s", gait.profile)
+        keeping = self._needed(f"to walk at {gait.speed:.4f} m/s", peaks_of_gait(gait.gait))
         stand = self._stand_after(gait)
         stop = await self._planner.plan(gait, stand, self._torque_limit)
-        stopping = self._needed(f"to stop from {gait.speed:.4f} m/s", *stop.steps, stand)
-        await self._lead_to(gait, order, (keeping, stopping))
+        stopping = self._needed(f"to stop from {gait.speed:.4f} m/s", stop.peaks | peaks_of([stand]))
+        await self._lead_to(StreamedGait.of(gait, stop), order, (keeping, stopping))
         self.refusal = ""
         return f"{gait} from the next step on{self._once_resumed}; {source}"
 
@@ -136,18 +135,11 @@ class WalkCommands:
         """Have the walk come to a stand, and return a sentence about it; it waits for nothing."""
         self.supersede()
         self.refusal = ""
-        pace = self._stream.pace
-        while isinstance(pace, StreamedGait):
-            stand = self._stand_after(pace)
-            plan = self._planner.plan_at_once(pace, stand)
-            if self._stream.follow(plan, stand):
-                # Whatever they need: a stop is always possible.
-                needs = PaceNeeds((JointNeed.of(_TO_STAND, [stand]),), JointNeed.of("to stop", plan.steps))
-                self._needs.add(self._stream.walk, stand, needs)
-                return f"{_STOPS}{self._once_resumed}"
-            pace = self._stream.pace
-        self._stream.walk.stay(pace)
-        return f"{_STOPS}{self._once_resumed}" if self._stream.walk.is_changing else "stands already"
+        while not self._turns_to_stand():
+            pass  # The stream has gone on to another pace meanwhile.
+        walk = self._stream.walk
+        stands = isinstance(walk.pace, StandProfile) and not walk.is_changing
+        return "stands already" if stands else f"{_STOPS}{self._once_resumed}"
 
     def supersede(self) -> None:
         """End what is under way: another command counts from now on."""
@@ -175,7 +167,7 @@ class WalkCommands:
 
     async def _fetch(
         self, request: GaitRequest, order: WalkOrder, wait_for_library: bool
-    ) -> tuple[StreamedGait, str]:
+    ) -> tuple[ReceivedGait, str]:
         """Return a gait of the library, and the sentence that it came with.
 
         Args:
@@ -204,7 +196,20 @@ class WalkCommands:
             await self._node.sleep(_RETRY_PERIOD)
         if not answer.success:
             raise GaitNotFoundError(answer.message)
-        return StreamedGait.from_message(answer.gait, self._walker), answer.message
+        return ReceivedGait.from_message(answer.gait, self._walker), answer.message
+
+    def _turns_to_stand(self) -> bool:
+        """Have the present pace be followed by a stand, and return whether it still is the present one."""
+        walk, pace = self._stream.walk, self._stream.pace
+        if not isinstance(pace, StreamedGait):
+            return walk.stay(profile_of_goal(pace))
+        stop = pace.stop
+        if not self._stream.follow(stop.plan, stop.leads_to):
+            return False
+        stand = profile_of_goal(stop.leads_to)
+        standing = JointNeed(_TO_STAND, peaks_of([stand]))
+        self._needs.add(walk, stand, PaceNeeds((standing,), JointNeed("to stop", stop.peaks)))
+        return True
 
     async def _lead_to(self, goal: StreamedGait, order: WalkOrder, staying: tuple[JointNeed, ...]) -> None:
         """Have the stream walk to a gait, which needs something itself, from the pace that it then has."""
@@ -216,26 +221,26 @@ class WalkCommands:
                 if self._stream.walk.stay(pace.profile):
                     return
                 continue
-            plan = await self._planner.plan(pace, goal, self._torque_limit)
+            way = await self._planner.plan(pace, goal, self._torque_limit)
             order.require_valid()
             for need in staying:  # Limits may have been lowered meanwhile.
                 self.limits.require(need)
-            leading = self._needed(f"to get to {goal.speed:.4f} m/s", *plan.steps)
-            if self._stream.follow(plan, goal):
+            leading = self._needed(f"to get to {goal.speed:.4f} m/s", way.peaks)
+            if self._stream.follow(way.plan, goal):
                 self._needs.add(self._stream.walk, goal.profile, PaceNeeds(staying, leading))
                 return
 
-    def _needed(self, purpose: str, *steps: StepProfile) -> JointNeed:
-        """Return what steps need of the joints.
+    def _needed(self, purpose: str, peaks: JointPeaks) -> JointNeed:
+        """Return what something needs of the joints.
 
         Raises:
-            JointLimitError: the joints can't do them.
+            JointLimitError: the joints can't do it.
         """
-        need = JointNeed.of(purpose, steps)
+        need = JointNeed(purpose, peaks)
         self.limits.require(need)
         return need
 
-    def _stand_after(self, gait: StreamedGait) -> StandProfile:
+    def _stand_after(self, gait: ReceivedGait) -> StandProfile:
         """Return the stand that a gait is stopped in: its knee springs stay as they are."""
         return StandProfile(self._standing.on(gait.spring))
 

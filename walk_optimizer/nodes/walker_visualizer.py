@@ -22,7 +22,7 @@ from walk_optimizer.nodes.parameters import Setting, require_frame
 from walk_optimizer.nodes.qos import LATCHED, STREAM
 from walk_optimizer.nodes.running import run_node
 from walk_optimizer.nodes.scene_markers import SceneMarkers
-from walk_optimizer.nodes.streamed_gait import StreamedGait
+from walk_optimizer.nodes.streamed_gait import ReceivedGait
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.transform_messages import transforms_to_message
 from walk_optimizer.nodes.visualizer_health import VisualizerHealth
@@ -105,7 +105,7 @@ class WalkerVisualizerNode(SuiteNode):
 
     def _take_gait(self, message: GaitMessage) -> None:
         try:
-            gait = ShownGait(StreamedGait.from_message(message, self._walker).gait)
+            gait = ShownGait(ReceivedGait.from_message(message, self._walker).gait)
         except WalkOptimizerError as error:
             self.get_logger().warning(f"gait not shown: {error}")
             return

@@ -18,6 +18,7 @@ from walk_optimizer.refined_certificate import (
     jump_entries,
     largest,
 )
+from walk_optimizer.refined_peaks import torque_peaks
 from walk_optimizer.replay import interval_errors
 from walk_optimizer.transition.paces import (
     Pace,
@@ -35,7 +36,7 @@ FloatArray = NDArray[np.float64]
 _TOLERANCE = 1e-6
 # Joints of the source, of the steps and of the target meet this closely, in [rad].
 JOINT_TOLERANCE = 1e-8
-# Between the nodes torques are quadratic: they may be beyond their limit by this part of it.
+# Torques may be beyond their limit by this part of the walker's weight, times 1 m.
 _TORQUE_TOLERANCE = 1e-6
 
 
@@ -87,7 +88,7 @@ def _step_entries(
     mechanics = mechanics_at(walker, step.spring, nodes[:6], nodes[6:])
     forces = trajectory.forces.reshape(-1, 4).T
     landing = step_length(walker, trajectory.states[-1, -1]) - step.step_length
-    torque = max(0.0, float(np.abs(trajectory.torques).max()) - torque_limit)
+    torque = max(0.0, float(torque_peaks(trajectory).max()) - torque_limit)
     return [
         *collocation_entries(walker, trajectory, mechanics),
         *jump_entries(walker, step, before),

@@ -9,6 +9,7 @@ from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import Certificate
 from walk_optimizer.mesh_adaptation import MeshErrors, resampled, trajectory_on
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.refined_peaks import torque_peaks
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import SolverSettings, solver_settings
@@ -35,6 +36,8 @@ FloatArray = NDArray[np.float64]
 _FIRST_BARRIER, _NEXT_BARRIER = 1e-3, 1e-5
 _FEWEST_INTERVALS = 4
 _ROUNDS = 5
+# A bound at the nodes that is lowered, since torques are higher between them, is lowered so much further.
+_TORQUE_MARGIN = 1e-3
 # On level ground the length of treads plays no part.
 _ANY_TREAD = 1.0
 
@@ -58,7 +61,7 @@ def plan_transition(
         source: The gait or stand that is left.
         target: The gait or stand that is reached; one of both is a gait.
         steps: Number of steps; None means that of the settings, and one more where that has no solution.
-        torque_limit: Largest magnitude of each torque in [N m].
+        torque_limit: Largest magnitude of each torque in [N m], between the nodes of the solve too.
         settings: Of steps; the packaged ones by default.
         solver: Settings of the solver; the packaged ones by default.
         time_limit: In [s], above 0; the solver settings' by default.
@@ -145,17 +148,34 @@ class _Solve:
         barrier, rounds = _FIRST_BARRIER, 0
         while True:
             status, points = self._solved(mesh, points, barrier)
-            trajectory, rounds = trajectory_on(mesh, points), rounds + 1
-            if status is not Status.SOLVED or rounds == _ROUNDS:
+            trajectory = trajectory_on(mesh, points)
+            if status is not Status.SOLVED:
                 return self._outcome(status, mesh, trajectory)
             errors = MeshErrors.of(self.walker, _ANY_TREAD, self.spring, trajectory)
-            if errors.met:
+            barrier = _NEXT_BARRIER
+            if errors.met and self._tightened(trajectory):
+                continue
+            rounds += 1
+            if errors.met or rounds == _ROUNDS:
                 outcome = self._outcome(status, mesh, trajectory)
-                if outcome.transition is not None:
+                if outcome.transition is not None or rounds == _ROUNDS:
                     return outcome
             finer = errors.halved(mesh) if errors.met else errors.divided(mesh)
             points = resampled(trajectory, self.spring, mesh, finer)
-            mesh, barrier = finer, _NEXT_BARRIER
+            mesh = finer
+
+    def _tightened(self, trajectory: RefinedTrajectory) -> bool:
+        """Lower the bound of the torques at the nodes if they exceed their limit between these.
+
+        Returns:
+            Whether they do.
+        """
+        peak = float(torque_peaks(trajectory).max())
+        if peak <= self.request.torque_limit:
+            return False
+        lower = self.limits.torque * self.request.torque_limit / peak
+        self.limits = replace(self.limits, torque=lower * (1 - _TORQUE_MARGIN))
+        return True
 
     def _solved(self, mesh: Mesh, points: RefinedPoints, barrier: float) -> tuple[Status, RefinedPoints]:
         """Solve on a mesh from a start; return how it ended and where."""

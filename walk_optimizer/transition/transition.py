@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from walk_optimizer.gait import Certificate, RefinedGait
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.refined_peaks import torque_peaks
 from walk_optimizer.solve.status import SolveReport
 from walk_optimizer.transition.paces import Pace
 
@@ -64,8 +65,8 @@ class Transition:
 
     @property
     def peak_torques(self) -> FloatArray:
-        """Largest magnitudes of the torques of the hips and of the knees at the nodes in [N m], (2,)."""
-        peaks = np.max([np.abs(step.trajectory.torques).max(axis=(0, 1)) for step in self.steps], axis=0)
+        """Largest magnitudes of the torques of the hips and of the knees in [N m], (2,)."""
+        peaks = np.max([torque_peaks(step.trajectory) for step in self.steps], axis=0)
         return np.array([peaks[0], peaks[1:].max()])
 
 
