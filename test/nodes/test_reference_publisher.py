@@ -158,7 +158,7 @@ def test_bad_target_speeds_are_logged_and_the_walk_goes_on(graph, publisher):
 
 def test_refusals_say_what_the_core_says(graph, publisher):
     early = graph.call(GetJointTrajectory, f"{NODE}/joint_trajectory")
-    assert (early.success, early.message) == (False, "no gait is streamed yet; call set_gait first")
+    assert (early.success, early.message) == (False, "no gait is walked now; call ~/set_gait first")
     with pytest.raises(InvalidRequestError) as refusal:
         GaitRequest.for_speed(-1.0, MODE)
     answer = graph.call(SetGait, f"{NODE}/set_gait", speed=-1.0, spring_mode=MODE)
@@ -282,7 +282,7 @@ def test_the_bag_holds_what_was_streamed(graph, publisher, tmp_path):
 
 
 def test_what_the_node_records_itself_is_in_the_bag_once_though_it_is_asked_for_again(graph, start, tmp_path):
-    named = ["~/target_speed", "/robot/velocity", "reference_publisher/joint_reference"]
+    named = ["~/target_speed", "/robot/velocity", "reference_publisher/joint_reference", "nobody/there"]
     start(NODE, remaps={"~/cmd_vel": "/robot/velocity"}, recording_topics=named, **PATIENT)
     joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
     speeds, velocities = (
@@ -296,7 +296,8 @@ def test_what_the_node_records_itself_is_in_the_bag_once_though_it_is_asked_for_
         speeds.publish(Float64(data=speed))
         velocities.publish(Twist(linear=Vector3(x=speed)))
         graph.spin_for(SETTLING)
-    assert graph.call(StopRecording, f"{NODE}/stop_recording").success
+    stopped = graph.call(StopRecording, f"{NODE}/stop_recording")
+    assert stopped.message == f"{stopped.messages} messages, 0 dropped; nobody published /nobody/there"
     bag = read_bag(tmp_path / "bag")
     assert [message.data for message in bag[f"/{NODE}/target_speed"]] == [0.0, 99.0]
     assert [message.linear.x for message in bag["/robot/velocity"]] == [0.0, 99.0]

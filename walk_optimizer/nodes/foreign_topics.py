@@ -26,6 +26,7 @@ class ForeignTopics:
 
     Attributes:
         recorder: That gets them.
+        missing: Names of those that nobody has published.
     """
 
     def __init__(self, node: SuiteNode, names: Iterable[str], recorder: Recorder) -> None:
@@ -37,7 +38,7 @@ class ForeignTopics:
             recorder: That was started.
         """
         self._node, self.recorder = node, recorder
-        self._missing = set(names)
+        self.missing = set(names)
         self._subscriptions: list[Subscription] = []
         self._timer = node.repeat(_LOOK_PERIOD, self._look)
         self._look()
@@ -49,10 +50,10 @@ class ForeignTopics:
             self._node.destroy_subscription(subscription)
 
     def _look(self) -> None:
-        for name in sorted(self._missing):
+        for name in sorted(self.missing):
             publishers = self._node.get_publishers_info_by_topic(name)
             if publishers:
-                self._missing.discard(name)
+                self.missing.discard(name)
                 try:
                     self._record(name, publishers)
                 except (MessageDefinitionError, RuntimeError) as error:  # also what SROS2 denies

@@ -93,11 +93,11 @@ class RecordingControl:
         response.message = f"recording to {directory}"
 
     async def _stop(self, _request: StopRecording.Request, response: StopRecording.Response) -> None:
-        status = await self._end()
+        status, absent = await self._end()
         response.directory, response.messages = str(status.directory), status.messages
         if status.error is not None:
             raise status.error
-        response.message = f"{status.messages} messages, {status.dropped} dropped"
+        response.message = f"{status.messages} messages, {status.dropped} dropped{absent}"
 
     async def _follow(self, wanted: bool) -> None:
         if not self._node.active:
@@ -123,13 +123,14 @@ class RecordingControl:
         self._node.get_logger().info(f"recording to {directory}")
         return directory
 
-    async def _end(self) -> RecorderStatus:
-        """Close the bag and return what is in it."""
+    async def _end(self) -> tuple[RecorderStatus, str]:
+        """Close the bag and return what is in it, and in words what is not."""
         status = await self._done(self._bag.stop)
+        absent = self._absent()
+        self._tell_closed(status)
         self._listen_to_others()
         self._show()
-        self._tell_closed(status)
-        return status
+        return status, absent
 
     async def _done(self, work: Callable[[], _Result]) -> _Result:
         """Have the thread do something, and return its result."""
@@ -148,8 +149,14 @@ class RecordingControl:
             names = {str(self._node.resolve_topic_name(name)) for name in named} - self._bag.names
             self._foreign = ForeignTopics(self._node, names, recorder)
 
+    def _absent(self) -> str:
+        """Return which topics the bag should hold and nobody has published, as the end of a sentence."""
+        names = self._foreign.missing if self._foreign is not None else ()
+        return f"; nobody published {', '.join(sorted(names))}" if names else ""
+
     def _tell_closed(self, status: RecorderStatus) -> None:
-        self._node.get_logger().info(f"closed {status.directory} with {status.messages} messages")
+        text = f"closed {status.directory} with {status.messages} messages{self._absent()}"
+        self._node.get_logger().info(text)
 
     def _show(self) -> None:
         """Make the parameter `record` say what is."""

@@ -147,7 +147,7 @@ class ReferencePublisherNode(ManagedNode):
     ) -> None:
         gait = self._stream.gait
         if gait is None:
-            raise GaitNotFoundError("no gait is streamed yet; call set_gait first")
+            raise GaitNotFoundError("no gait is walked now; call ~/set_gait first")
         rate = request.rate if request.rate != 0 else self.parameters["rate"]
         cycle = self._cycles.make(
             gait.profile, rate, self.parameters["joint_names"], self.parameters["trajectory_effort"]
