@@ -5,12 +5,14 @@ Owns what happens to files that can't be used. Does not own which gait answers a
 """
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from walk_optimizer.errors import GaitFileError, GaitNotFoundError, GaitNotWritableError
 from walk_optimizer.gait import Gait
 from walk_optimizer.gait_files import SUFFIX, gait_file_name, read_gait_file, write_gait_file
 from walk_optimizer.gait_files.access import writable_folder
+from walk_optimizer.gait_files.codec import encode
 from walk_optimizer.library_entries import GaitSummary, LibraryEntry, Source, summarize, table_order
 from walk_optimizer.library_selection import (
     EXACT_SPEED_TOLERANCE,
@@ -77,15 +79,15 @@ class GaitLibrary:
 
     def reload(self) -> None:
         """Read both folders again."""
-        entries: dict[str, LibraryEntry] = {}
+        found: list[LibraryEntry] = []
         problems: list[str] = []
         for path, source in _gait_files(self.walker, self.folder):
             try:
-                _keep_better(entries, _read_entry(path, source, self.walker))
+                found.append(_read_entry(path, source, self.walker))
             except GaitFileError as error:
                 problems.append(str(error))
-        # Replaced as a whole, never changed: another thread that looks a gait up sees the old or the new.
-        self._entries = tuple(sorted(entries.values(), key=table_order))
+        self._found = found
+        self._entries = _best(found)
         self._problems = tuple(problems)
         self._unsaved: dict[Path, str] = {}
 
@@ -147,7 +149,8 @@ class GaitLibrary:
             still served when its F is smaller.
 
         Raises:
-            GaitFileError: the gait is not certified, for another walker, or a number is not finite.
+            GaitFileError: the gait is not certified, for another walker, or a number is not finite;
+                nothing has changed.
             GaitNotWritableError: it can't be written, and is lost when this process ends.
         """
         if not gait.certificate.certified:
@@ -156,23 +159,25 @@ class GaitLibrary:
         if gait.walker != self.walker:
             raise GaitFileError("the gait is for another walker than the library")
         path = self.folder / gait_file_name(gait)
-        self._serve(gait, path)
         try:
             writable_folder(self.folder, self._create)
             write_gait_file(gait, path)
-        except GaitFileError as error:
+        except GaitNotWritableError as error:
+            encode(gait)  # Refuses what no file could hold.
+            self._serve(gait, path)
             self._unsaved[path] = str(error)
             raise GaitNotWritableError(
                 f"the gait is kept in memory only, and lost when this process ends: {error}"
             ) from error
+        self._serve(gait, path)
         self._unsaved.pop(path, None)
         self._problems = tuple(text for text in self._problems if not text.startswith(f"{path}:"))
         return path
 
     def _serve(self, gait: Gait, path: Path) -> None:
-        entries = {e.path.name: e for e in self._entries if e.path != path}
-        _keep_better(entries, LibraryEntry(gait, Source.CACHE, path))
-        self._entries = tuple(sorted(entries.values(), key=table_order))
+        others = [entry for entry in self._found if entry.path != path]
+        self._found = [*others, LibraryEntry(gait, Source.CACHE, path)]
+        self._entries = _best(self._found)
 
 
 def _gait_files(walker: WalkerParameters, folder: Path) -> list[tuple[Path, Source]]:
@@ -196,8 +201,14 @@ def _read_entry(path: Path, source: Source, walker: WalkerParameters) -> Library
     return LibraryEntry(gait, source, path)
 
 
-def _keep_better(entries: dict[str, LibraryEntry], entry: LibraryEntry) -> None:
-    """Add an entry by its file name, unless there is one of the same request with a smaller F."""
-    other = entries.get(entry.path.name)
-    if other is None or entry.gait.objective <= other.gait.objective:
-        entries[entry.path.name] = entry
+def _best(found: Sequence[LibraryEntry]) -> tuple[LibraryEntry, ...]:
+    """Return the gaits to serve, in the order of the table: of files for the same request the least F.
+
+    A tuple that is replaced as a whole: another thread that looks a gait up sees the old or the new ones.
+    """
+    best: dict[str, LibraryEntry] = {}
+    for entry in found:
+        other = best.get(entry.path.name)
+        if other is None or entry.gait.objective <= other.gait.objective:
+            best[entry.path.name] = entry
+    return tuple(sorted(best.values(), key=table_order))

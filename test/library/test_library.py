@@ -7,8 +7,10 @@ import signal
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from library.made_up_gait import all_modes, made_up_gait
 
@@ -148,6 +150,33 @@ def test_a_stored_gait_is_served_at_once_and_again_later(table, folder):
         assert each.find(FAST, "none")[1] is Source.CACHE
 
 
+def test_the_packaged_gait_is_served_until_a_better_one_is_stored(table, folder):
+    put(table, torque=2.0)
+    library = GaitLibrary(WALKER, folder)
+    for torque, source in ((1.5, Source.CACHE), (4.0, Source.TABLE), (1.0, Source.CACHE)):
+        library.store(made_up_gait(torque=torque))
+        for each in (library, GaitLibrary(WALKER, folder)):
+            gait, found = each.find(FAST, "none")
+            assert found is source
+            assert gait.objective == pytest.approx(made_up_gait(torque=min(torque, 2.0)).objective)
+
+
+def test_a_gait_with_a_number_that_is_none_changes_nothing(table, folder, monkeypatch):
+    library = GaitLibrary(WALKER, folder)
+    library.store(made_up_gait(torque=2.0))
+    gait = made_up_gait()
+    q = gait.trajectory.q.copy()
+    q[3, 4] = math.nan
+    broken = replace(gait, trajectory=replace(gait.trajectory, q=q))
+    for place in (folder, folder / "missing"):
+        monkeypatch.setattr(library, "folder", place)
+        with pytest.raises(GaitFileError, match="not finite") as error:
+            library.store(broken)
+        assert not isinstance(error.value, GaitNotWritableError)
+        assert library.unsaved() == []
+        assert np.isfinite(library.find(FAST, "none")[0].trajectory.q).all()
+
+
 def test_only_certified_gaits_of_this_walker_are_stored(table, folder):
     library = GaitLibrary(WALKER, folder)
     with pytest.raises(GaitFileError, match="only certified gaits are stored; this one fails: dynamics"):
@@ -214,11 +243,11 @@ def test_an_unusable_folder_is_named_when_writing_is_wanted(table, tmp_path):
     link.symlink_to(tmp_path / "real")
     file.touch()
     for place, message in (
-        (missing, "the gait folder is missing"),
+        (missing, "the folder is missing"),
         (link, "is a symbolic link"),
-        (file, "the gait folder is missing"),
-        (file / "below", "the gait folder is missing|not writable"),
-        (Path("/proc/1"), "the gait folder is not writable"),
+        (file, "the folder is missing"),
+        (file / "below", "the folder is missing|not writable"),
+        (Path("/proc/1"), "the folder is not writable"),
     ):
         with pytest.raises(GaitFileError, match=message) as error:
             GaitLibrary(WALKER, place, writable=True)
@@ -228,7 +257,7 @@ def test_an_unusable_folder_is_named_when_writing_is_wanted(table, tmp_path):
 def test_a_cache_below_a_file_is_refused(table, tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    with pytest.raises(GaitFileError, match="the gait folder is not writable: Not a directory"):
+    with pytest.raises(GaitFileError, match="the folder is not writable: Not a directory"):
         GaitLibrary(WALKER, writable=True)
 
 
