@@ -1,6 +1,7 @@
 """Independent solves are shared out between processes, and come back as if one had done them."""
 
 import multiprocessing
+import multiprocessing.connection
 import os
 import signal
 import time
@@ -97,6 +98,16 @@ def test_what_a_lost_fork_had_is_done_again(session):
         return number
 
     assert session.map(work, range(6)) == list(range(6))
+
+
+def test_what_a_fork_had_that_is_lost_while_it_sends_is_done_again(session, monkeypatch):
+    def cut_off(connection, _results):
+        header = (1000).to_bytes(4, "big")  # of a message of which ten bytes follow
+        os.write(connection.fileno(), header + bytes(10))
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    monkeypatch.setattr(multiprocessing.connection.Connection, "send", cut_off)
+    assert session.map(lambda number: time.sleep(0.02) or number, range(6)) == list(range(6))
 
 
 def test_an_error_in_a_fork_is_raised_here(session):

@@ -1,3 +1,4 @@
+import errno
 import math
 import os
 import signal
@@ -11,6 +12,7 @@ import pytest
 from solve.worker_jobs import work
 
 from walk_optimizer.errors import SolveFailedError
+from walk_optimizer.solve import worker as worker_module
 from walk_optimizer.solve.status import Status
 from walk_optimizer.solve.worker import BusyError, PoolState, WorkerPool
 from walk_optimizer.solve.worker_task import SolveStoppedError
@@ -129,6 +131,24 @@ def test_a_worker_that_died_idle_is_replaced_unnoticed(pool):
     while pool.state().workers:
         assert time.monotonic() < deadline
         time.sleep(0.01)
+    assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
+
+
+def test_a_process_that_cannot_be_started_is_an_answer_and_the_next_job_is_done(pool, monkeypatch):
+    os.kill(pool.submit("pid", FOREVER).future.result(PATIENCE), signal.SIGKILL)
+    deadline = time.monotonic() + PATIENCE
+    while pool.state().workers:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+    def no_process(_function):
+        raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(worker_module, "WorkerHandle", no_process)
+        error = pool.submit("echo lost", FOREVER).future.exception(PATIENCE)
+    assert isinstance(error, SolveFailedError)
+    assert str(error) == "no process for the solve: Resource temporarily unavailable"
     assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
 
 

@@ -114,7 +114,7 @@ def _received(connection: "Connection[Any, Any]") -> dict[int, Any]:
     """Return the results of a fork; none of one that was lost."""
     try:
         results: dict[int, Any] = connection.recv()
-    except EOFError:
+    except (EOFError, OSError):  # It ended before the first byte, or after it.
         return {}
     return results
 

@@ -146,9 +146,13 @@ class WorkerPool:
         """Body of a thread: one worker process, renewed whenever it is lost."""
         worker = self._workers[index] = WorkerHandle(self._function)
         while (task := self._next_task()) is not None:
-            if not worker.alive:
-                worker.end()
-                worker = self._workers[index] = WorkerHandle(self._function)
+            try:
+                if not worker.alive:
+                    worker.end()
+                    worker = self._workers[index] = WorkerHandle(self._function)
+            except OSError as error:
+                self._finish(task, error=SolveFailedError(f"no process for the solve: {error.strerror}"))
+                continue
             self._do(task, worker)
         worker.end()
 
