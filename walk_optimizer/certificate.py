@@ -145,7 +145,7 @@ def landing_speed_entries(walker: WalkerParameters, mechanics: Mechanics) -> lis
 
 
 def stance_load_entries(walker: WalkerParameters, normal: FloatArray) -> list[CertificateEntry]:
-    """Return by how much no foot carries the least load; nothing where none is asked for.
+    """Return by how much a foot that stands alone carries too little; nothing where no load is asked for.
 
     Args:
         walker: The walker.
@@ -153,7 +153,8 @@ def stance_load_entries(walker: WalkerParameters, normal: FloatArray) -> list[Ce
     """
     if not walker.stance_load:
         return []
-    shortfall = _excess(walker.stance_load * walker.weight - normal.max(axis=0))
+    alone = (normal > 0).sum(axis=0) < 2
+    shortfall = _excess(alone * (walker.stance_load * walker.weight - normal.max(axis=0)))
     return [CertificateEntry("stance_load", shortfall, "N", RELATIVE_TOLERANCE * walker.weight)]
 
 

@@ -54,8 +54,9 @@ class MeshErrors:
         """
         of_local = (self.local / (_SAFETY * LOCAL_ERROR)) ** (1 / 6)
         of_excess = np.sqrt(self.excess / (_SAFETY * LARGEST_EXCESS))
-        parts = np.ceil(np.maximum(of_local, of_excess)).astype(int)
-        return mesh.divided(np.clip(parts, 1, _MOST_PARTS))
+        # An error that is infinite, or no number, is that of a replay that came to no end.
+        parts = np.nan_to_num(np.maximum(of_local, of_excess), nan=_MOST_PARTS, posinf=_MOST_PARTS)
+        return mesh.divided(np.clip(np.ceil(parts), 1, _MOST_PARTS).astype(int))
 
     def halved(self, mesh: Mesh) -> Mesh:
         """Return the mesh with the less accurate half of its intervals halved.

@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from walk_optimizer.certificate import certify
+from walk_optimizer.certificate import certify, stance_load_entries
 from walk_optimizer.mechanics import mechanics_at
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import optimize
@@ -56,6 +57,16 @@ def least_loads(gait):
 def test_the_stance_foot_keeps_its_load(gaits):
     assert max(least_loads(gaits[FREE])) < 0.83
     assert min(least_loads(gaits[BOUNDED])) >= BOUNDED.stance_load - 1e-6
+
+
+def test_two_feet_share_the_load():
+    load = 0.6 * BOUNDED.weight
+    walker = replace(BOUNDED, stance_load=0.7)
+    shared, alone = np.array([[load, 0.0], [load, load]]), np.array([[load, 0.0], [0.0, load]])
+    assert [entry.met for entry in stance_load_entries(walker, shared[:, :1])] == [True]
+    for normal in (shared, alone):
+        (entry,) = stance_load_entries(walker, normal)
+        assert entry.violation == pytest.approx(0.1 * walker.weight)
 
 
 def test_it_costs_something(gaits):

@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.gait import Gait, RefinedGait
-from walk_optimizer.mesh_adaptation import resampled
+from walk_optimizer.mesh_adaptation import _MOST_PARTS, MeshErrors, resampled
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refinement import RefinedSolves, refine
 from walk_optimizer.replay import replay_step
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
+from walk_optimizer.transcription.mesh import even_mesh
+from walk_optimizer.transcription.phases import phases_of
 
 
 def test_it_is_certified_and_walks_as_fast_as_requested(gait: Gait, refined: RefinedGait) -> None:
@@ -34,6 +37,15 @@ def test_a_mesh_twice_as_fine_changes_its_effort_by_less_than_a_thousandth(
     start = resampled(solution.trajectory, solution.spring, solution.mesh, finer)
     again = RefinedSolves(gait.request, gait.walker, session).solved(finer, start)
     assert again.effort == pytest.approx(solution.effort, rel=1e-3)
+
+
+@pytest.mark.parametrize("error", [np.inf, np.nan, 1.0])
+def test_intervals_whose_replay_comes_to_no_end_are_divided_most(error: float) -> None:
+    mesh = even_mesh([phases_of(single_impact(20))], 5)
+    local = np.zeros(mesh.intervals)
+    local[1] = error
+    divided = MeshErrors(local, np.zeros_like(local)).divided(mesh)
+    assert divided.intervals == mesh.intervals - 1 + _MOST_PARTS
 
 
 def test_the_grid_of_the_report_overestimates_the_effort(gait: Gait, refined: RefinedGait) -> None:
