@@ -9,7 +9,6 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
-from importlib.util import find_spec
 from typing import NoReturn
 
 from walk_optimizer import __version__
@@ -75,9 +74,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     verbs = parser.add_subparsers(metavar="VERB", required=True, parser_class=Parser)
     for verb in _VERBS:
-        name = f"walk_optimizer.cli.{verb}"
-        if find_spec(name) is not None:
-            importlib.import_module(name).add_parser(verbs)
+        importlib.import_module(f"walk_optimizer.cli.{verb}").add_parser(verbs)
     return parser
 
 

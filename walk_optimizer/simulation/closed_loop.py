@@ -5,13 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.errors import SolveFailedError
 from walk_optimizer.gait import Gait
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.simulation.controllers import Controller, FeedForward, PathFeedback
-from walk_optimizer.simulation.ground import StepGround
 from walk_optimizer.simulation.linearization import LinearizedStep
-from walk_optimizer.simulation.pinned_walker import STATE_WIDTH, PinnedWalker
+from walk_optimizer.simulation.pinned_walker import PinnedWalker
 from walk_optimizer.simulation.reference import StepReference, step_reference
 from walk_optimizer.simulation.regulator import regulator_gains
 from walk_optimizer.simulation.settings import SimulationSettings
@@ -94,27 +92,6 @@ class ClosedLoop:
         """Return how far any joint was from the gait at the same place of the hip, in [rad]."""
         deviations = (self.feedback.deviation(state) for stride in result.strides for state in stride.states)
         return float(max(np.abs(deviation[:4]).max() for deviation in deviations))
-
-    def return_map_jacobian(self, change: float) -> FloatArray:
-        """Return the derivative of the state after a step by that before, by central differences, (8, 8).
-
-        Args:
-            change: Of each joint angle in [rad] and rate in [rad/s].
-
-        Raises:
-            SolveFailedError: a step so close to the gait ends in a fall.
-        """
-        ground = StepGround(self.plant.walker.terrain, self.reference.step_length)
-        simulator, columns = self.simulator(), []
-        for direction in change * np.eye(STATE_WIDTH):
-            ends = []
-            for start in (self.start + direction, self.start - direction):
-                stride = simulator.run(start, ground)
-                if stride.next_state is None:
-                    raise SolveFailedError(f"no return to the gait: {stride.ending.sentence}")
-                ends.append(stride.next_state)
-            columns.append((ends[0] - ends[1]) / (2 * change))
-        return np.array(columns).T
 
 
 def closed_loop(gait: Gait, settings: SimulationSettings) -> ClosedLoop:
