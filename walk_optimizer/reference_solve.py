@@ -27,8 +27,16 @@ from walk_optimizer.transcription.scaling import torque_unit
 
 FloatArray = NDArray[np.float64]
 
+# Where IPOPT's defaults are not those of our own solves.
+_DEFAULTS = (
+    ("linear_solver", "mumps"),
+    ("mumps_pivot_order", 7),
+    ("min_refinement_steps", 1),
+    ("constr_mult_init_max", 1e3),
+)
 # Section 3.2 of the report; everything else is as IPOPT has it by default.
 _REPORT_OPTIONS = (
+    *_DEFAULTS,
     ("mu_strategy", "adaptive"),
     ("adaptive_mu_globalization", "kkt-error"),
     ("mu_oracle", "probing"),

@@ -16,6 +16,8 @@ KMH_PER_MS = 3.6
 # The report prints km/h with two decimals: a speed within one unit of the last one names a table gait.
 TABLE_SPEED_TOLERANCE = 0.01 / KMH_PER_MS
 _BYTES_PER_POINT = 40_000
+# The impact of the landing takes the first two points of a step.
+_FEWEST_POINTS = 3
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class GaitTableSettings:
         for name, low, high in (
             ("gaits", 2, math.inf),
             ("minimum_speed", 0.0, self.maximum_speed),
-            ("minimum_points", 1, self.maximum_points),
+            ("minimum_points", _FEWEST_POINTS, self.maximum_points),
             ("points", self.minimum_points, self.maximum_points),
         ):
             value = getattr(self, name)

@@ -28,6 +28,9 @@ FloatArray = NDArray[np.float64]
 def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSession) -> RefinedGait | None:
     """Return the certified gait of a new speed; None where the neighbours do not lead to one.
 
+    Each of its intervals is replayed; that its torques alone lead through the whole of an unstable step
+    is not seen to (`shadowing`): it would take as long again.
+
     Args:
         request: Speed, step and spring mode.
         neighbours: Refined gaits of the same walker in single support: one, or two with speeds on

@@ -3,8 +3,8 @@
 Collocation follows the motion but for the local error of each interval. A straight knee under load is so
 unstable that such errors, some 1e-8 rad, grow to radians before the step ends when its torques are replayed
 from its first state. Close to the states of the solution the same torques make a motion without errors. The
-closest one is found by least squares [Wang2014]. The step then begins where that motion does; behind its first
-interval nothing changes.
+closest one is found by least squares [Wang2014]. The step then begins where that motion does; behind its
+first interval nothing changes.
 """
 
 from dataclasses import replace

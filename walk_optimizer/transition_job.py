@@ -1,6 +1,5 @@
 """Transitions as jobs of a worker process: the solved ones of the table, or solved now and put there."""
 
-import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,8 @@ from walk_optimizer.transition.table import TransitionTable
 
 # Of the worker: what runs beside it, above all a stream of references, goes first.
 _NICENESS = 10
+# A limit of torques that are below this part of it has changed nothing.
+_FAR_BELOW = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +74,8 @@ def planned(job: TransitionJob, progress: ProgressCallback | None = None) -> Tra
     problems = table.problems()
     if outcome.transition is None:
         return TransitionAnswer((), outcome.report.message, "; ".join(problems))
-    # A file is named by its paces alone: steps that a limit has changed are not kept.
-    if math.isinf(job.torque_limit):
+    # A file is named by its paces alone: steps that a limit may have changed are not kept.
+    if outcome.transition.peak_torques.max() < _FAR_BELOW * job.torque_limit:
         try:
             table.store(outcome.transition)
         except GaitFileError as error:

@@ -220,7 +220,7 @@ def test_a_folder_that_cannot_be_written_stops_the_start(start, tmp_path):
     started = {place: start("gait_library", cache_folder=place) for place in places}
     for place, node in started.items():
         assert node.process.wait(60) == 1
-        assert f"can't start: {place}: the gait folder {places[place]}" in node.output()
+        assert f"can't start: {place}: the folder {places[place]}" in node.output()
         assert "Traceback" not in node.output()
 
 

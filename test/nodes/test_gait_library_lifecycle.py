@@ -77,7 +77,7 @@ def test_a_configure_that_fails_names_the_folder_and_can_be_repeated(graph, star
         return [one for array in heard for one in array.status if one.name == f"{NODE}: {name}"]
 
     assert change(graph, Transition.TRANSITION_CONFIGURE) == (False, "unconfigured")
-    assert f"can't configure: {folder}: the gait folder is missing" in node.output()
+    assert f"can't configure: {folder}: the folder is missing" in node.output()
     graph.spin_until(lambda: any(str(folder) in one.message for one in findings("lifecycle")), "the finding")
     assert findings("lifecycle")[-1].level == DiagnosticStatus.ERROR
     assert not graph.offered(NODE, f"/{NODE}/get_gait")

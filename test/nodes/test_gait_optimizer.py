@@ -309,6 +309,7 @@ def test_parameters_out_of_range_or_of_a_wrong_type_stop_the_start(start):
         node = start("gait_optimizer", **{name: value})
         assert node.process.wait(60) == 1
         assert name in node.output()
+        assert ("real numbers need a point" in node.output()) == isinstance(value, int) * (name == "time_limit")
         assert "Traceback" not in node.output()
 
 

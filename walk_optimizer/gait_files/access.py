@@ -73,19 +73,17 @@ def writable_folder(folder: Path, create: bool) -> None:
         GaitNotWritableError: the folder is missing, a link, no folder, or not writable; the message names it.
     """
     if folder.is_symlink():
-        raise GaitNotWritableError(
-            f"{folder}: the gait folder is a symbolic link, which is not written through"
-        )
+        raise GaitNotWritableError(f"{folder}: the folder is a symbolic link, which is not written through")
     try:
         if create:
             folder.mkdir(parents=True, exist_ok=True)
         if not folder.is_dir():
-            raise GaitNotWritableError(f"{folder}: the gait folder is missing; create it or name another")
+            raise GaitNotWritableError(f"{folder}: the folder is missing; create it or name another")
         # Permissions alone do not tell: the file system may be read-only, or full.
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise GaitNotWritableError(f"{folder}: the gait folder is not writable: {error.strerror}") from error
+        raise GaitNotWritableError(f"{folder}: the folder is not writable: {error.strerror}") from error
 
 
 def writable_target(path: Path) -> None:

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 
 import rclpy
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import InvalidParameterTypeException, ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
@@ -58,7 +58,10 @@ def _require_no_arguments() -> None:
 
 
 def _refused(error: Exception) -> int:
-    print(f"can't start: {error}", file=sys.stderr)
+    advice = ""
+    if isinstance(error, InvalidParameterTypeException) and "DOUBLE" in str(error):
+        advice = "; real numbers need a point, as in 200.0"
+    print(f"can't start: {error}{advice}", file=sys.stderr)
     return 1
 
 

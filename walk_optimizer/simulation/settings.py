@@ -77,7 +77,7 @@ class SimulationSettings:
         for name in ("lowest_hip", "landing_zone", "push_phase"):
             if getattr(self, name) >= 1:
                 raise ConfigurationError(
-                    f"simulation setting {name} is {getattr(self, name)}, allowed is 0 to 1"
+                    f"simulation setting {name} is {getattr(self, name)}, allowed is above 0 and below 1"
                 )
 
 

@@ -34,7 +34,7 @@ from walk_optimizer.transition.standing import Standing
 FloatArray = NDArray[np.float64]
 
 _TOLERANCE = 1e-6
-# Joints of the source, of the steps and of the target meet this closely, in [rad].
+# Joints meet this closely, in [rad], from the end of the source through all steps to the end of the target's.
 JOINT_TOLERANCE = 1e-8
 # Torques may be beyond their limit by this part of the walker's weight, times 1 m.
 _TORQUE_TOLERANCE = 1e-6
