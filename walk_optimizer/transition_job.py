@@ -13,8 +13,8 @@ from walk_optimizer.transition.table import TransitionTable
 
 # Of the worker: what runs beside it, above all a stream of references, goes first.
 _NICENESS = 10
-# A limit of torques that are below this part of it has changed nothing.
-_FAR_BELOW = 0.9
+# Torques below this part of a limit are not held back by it.
+_FREE = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +74,8 @@ def planned(job: TransitionJob, progress: ProgressCallback | None = None) -> Tra
     problems = table.problems()
     if outcome.transition is None:
         return TransitionAnswer((), outcome.report.message, "; ".join(problems))
-    # A file is named by its paces alone: steps that a limit may have changed are not kept.
-    if outcome.transition.peak_torques.max() < _FAR_BELOW * job.torque_limit:
+    # A file is named by its paces alone, so only steps that are an optimum without the limit too are kept.
+    if outcome.transition.peak_torques.max() < _FREE * job.torque_limit:
         try:
             table.store(outcome.transition)
         except GaitFileError as error:
