@@ -224,6 +224,24 @@ def test_a_folder_that_cannot_be_written_stops_the_start(start, tmp_path):
         assert "Traceback" not in node.output()
 
 
+def test_gaits_of_an_optimizer_with_another_walker_are_refused(graph, start, stocked):
+    """Nothing of it gets into the cache, where it would be for good."""
+    heavy = made_up_gait(speed=0.4, mode="none", walker=WalkerParameters(hip_mass=HIP_MASS + 1))
+
+    def solve(_request, response):
+        response.success = True
+        response.gait, response.report = gait_to_message(heavy), report_to_message(heavy.report)
+        return response
+
+    graph.node.create_service(OptimizeGait, OPTIMIZE, solve, qos_profile=SERVICE_QOS)
+    start("gait_library", **stocked)
+    before = sorted(stocked["cache_folder"].iterdir())
+    answer = graph.call(GetGait, GET, speed=0.4, spring_mode="none", selection="exact")
+    assert not answer.success
+    assert "give all nodes the same walker_file" in answer.message
+    assert sorted(stocked["cache_folder"].iterdir()) == before
+
+
 def test_a_solved_gait_that_can_not_be_stored_is_served_and_told(graph, start, stocked):
     """With an optimizer that answers at once, and a folder that goes away like a full disk."""
     gait = made_up_gait(speed=0.4, mode="none", walker=WalkerParameters(hip_mass=HIP_MASS))

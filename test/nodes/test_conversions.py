@@ -1,5 +1,6 @@
 """Gaits survive being messages, and messages that don't fit are refused."""
 
+import math
 from array import array
 from dataclasses import fields
 
@@ -45,6 +46,36 @@ def test_its_refined_part_survives_too():
     assert (back.spring, back.step_length) == (refined.spring, refined.step_length)
     assert back.certificate == refined.certificate
     assert message.refined[0].torque_effort == refined.trajectory.torque_effort
+
+
+@pytest.mark.parametrize(
+    "walker", [WalkerParameters(hip_mass=90.0), WalkerParameters(friction_coefficient=0.3)]
+)
+def test_a_gait_of_another_walker_is_refused(walker):
+    message = gait_to_message(made_up_gait())
+    with pytest.raises(GaitFileError, match=r"the gait is for a walker with .* the same walker_file"):
+        ReceivedGait.from_message(message, walker)
+
+
+@pytest.mark.parametrize("number", [0.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("field", ["step_time", "step_length"])
+@pytest.mark.parametrize("whole", [with_refinement(made_up_gait()), made_up_gait()])
+def test_steps_without_length_or_duration_are_refused(whole, field, number):
+    message = gait_to_message(whole)
+    setattr(message, field, number)
+    with pytest.raises(GaitFileError, match=f"{field} is {number}"):
+        ReceivedGait.from_message(message, WalkerParameters())
+
+
+@pytest.mark.parametrize("field", ["stiffness", "equilibrium"])
+def test_springs_that_are_no_numbers_are_refused(field):
+    message = gait_to_message(with_refinement(made_up_gait()))
+    for part in (message, message.refined[0]):
+        former = getattr(part, field)
+        setattr(part, field, math.nan)
+        with pytest.raises(GaitFileError, match="expected finite numbers"):
+            ReceivedGait.from_message(message, WalkerParameters())
+        setattr(part, field, former)
 
 
 def cut(name):

@@ -104,7 +104,7 @@ def _check_breaks(breaks: NDArray[np.float64], step_time: float) -> None:
     """Raise GaitFileError unless the ends of the intervals increase from 0 to the step time in [s]."""
     if np.any(np.diff(breaks) <= 0):
         raise GaitFileError("array refined_breaks does not increase")
-    if breaks[0] != 0 or abs(breaks[-1] - step_time) > _TIME_TOLERANCE:
+    if breaks[0] != 0 or not abs(breaks[-1] - step_time) <= _TIME_TOLERANCE:
         raise GaitFileError(
             f"array refined_breaks leads from {breaks[0]:g} s to {breaks[-1]:.9g} s, "
             f"expected 0 to {step_time:.9g} s"

@@ -46,6 +46,7 @@ def doubles(values: NDArray[np.float64]) -> "array[float]":
 def gait_to_message(gait: Gait) -> GaitMessage:
     """Return a gait as a message."""
     message = GaitMessage(
+        walker=gait.walker.fingerprint(),
         speed=gait.speed,
         step_length=gait.step_length,
         step_time=gait.request.step_time,
@@ -94,7 +95,7 @@ def trajectory_from_message(message: GaitMessage) -> Trajectory:
     for field, attribute, rows in _ARRAYS:
         arrays[attribute] = _array(field, getattr(message, field), (rows, points))
     if not all(np.isfinite(values).all() for values in arrays.values()):
-        raise GaitFileError("gait message: a number is not finite")
+        raise GaitFileError("gait message: a number of the trajectory is not finite")
     return Trajectory(**arrays)
 
 
@@ -117,10 +118,20 @@ def refined_from_message(message: GaitMessage) -> RefinedGait | None:
     }
     return RefinedGait(
         trajectory=refined_trajectory(arrays, message.step_time),
-        spring=KneeSpring(step.stiffness, step.equilibrium),
+        spring=_spring(step),
         step_length=positive(step.step_length, "gait message: step_length of the refined part"),
         certificate=certificate_from_message(step.certificate),
     )
+
+
+def _spring(message: GaitMessage | RefinedStep) -> KneeSpring:
+    """Return the knee spring of a message; raise GaitFileError unless its numbers are finite."""
+    if not (math.isfinite(message.stiffness) and math.isfinite(message.equilibrium)):
+        raise GaitFileError(
+            f"gait message: K is {message.stiffness} N m/rad and q_eq {message.equilibrium} rad, "
+            "expected finite numbers"
+        )
+    return KneeSpring(message.stiffness, message.equilibrium)
 
 
 def _array(name: str, numbers: Sequence[float], shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -134,23 +145,39 @@ def _array(name: str, numbers: Sequence[float], shape: tuple[int, ...]) -> NDArr
 def gait_from_message(
     message: GaitMessage, report: SolverReportMessage, walker: WalkerParameters, request: GaitRequest
 ) -> Gait:
-    """Return the gait of a message, solved for a walker and a request that the receiver knows."""
+    """Return the gait of a message, solved for a walker and a request that the receiver knows.
+
+    Raises:
+        GaitFileError: it was solved for another walker, or what it holds is not the whole of a gait.
+    """
+    if message.walker != walker.fingerprint():
+        raise GaitFileError(
+            f"the gait is for a walker with the fingerprint {message.walker or 'none'}, expected "
+            f"{walker.fingerprint()}; give all nodes the same walker_file"
+        )
     return Gait(
         walker=walker,
         request=request,
-        spring=KneeSpring(message.stiffness, message.equilibrium),
+        spring=_spring(message),
         trajectory=trajectory_from_message(message),
         report=report_from_message(report),
         certificate=certificate_from_message(message.certificate),
-        step_length=message.step_length,
+        step_length=positive(message.step_length, "gait message: step_length"),
         refined=refined_from_message(message),
     )
 
 
 def request_of_message(message: GaitMessage) -> GaitRequest:
-    """Return the request that a gait message answers, as far as it tells."""
-    mode = SpringMode.parse(message.spring_mode)
-    return GaitRequest(message.step_length, message.step_time, mode, message.points)
+    """Return the request that a gait message answers, as far as it tells.
+
+    Raises:
+        GaitFileError: the step has no length or no duration.
+        InvalidRequestError: the spring mode is unknown.
+    """
+    length, time = (
+        positive(getattr(message, one), f"gait message: {one}") for one in ("step_length", "step_time")
+    )
+    return GaitRequest(length, time, SpringMode.parse(message.spring_mode), message.points)
 
 
 def certificate_to_message(certificate: Certificate) -> CertificateMessage:

@@ -41,8 +41,8 @@ class ReceivedGait:
             walker: That it was solved for.
 
         Raises:
-            GaitFileError: its arrays don't fit.
-            InvalidRequestError: its step is no step that can be asked for.
+            GaitFileError: it is for another walker, or what it holds is not the whole of a gait.
+            InvalidRequestError: its spring mode is unknown.
             SolveFailedError: it is not certified.
         """
         if not message.certificate.certified:
