@@ -240,7 +240,7 @@ class Recorder:
         free, least = self._free_space(directory), self.settings.min_free_bytes
         if free < least:
             raise DiskFullError(
-                f"Not recording to {self.directory} any more: {free / 1e6:.1f} MB are free on the"
+                f"Not recording to {self.directory}: {free / 1e6:.1f} MB are free on the"
                 f" disk, and {least / 1e6:.1f} MB must stay free; {MAKE_SPACE}"
             )
 
