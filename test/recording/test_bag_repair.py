@@ -179,17 +179,17 @@ def test_messages_whose_topic_is_lost_are_counted(tmp_path):
 
 
 def test_a_split_bag_keeps_its_files_and_its_texts(tmp_path):
-    bag = write_bag(tmp_path / "walk", range(2000), RecorderSettings(max_file_bytes=100_000))
+    bag = write_bag(tmp_path / "walk.v2", range(2000), RecorderSettings(max_file_bytes=100_000))
     last = sorted(bag.glob("*.mcap"), key=lambda path: int(path.stem.split("_")[1]))[-1]
     last.write_bytes(last.read_bytes()[:-50])
     before = {path.name: path.read_bytes() for path in bag.iterdir()}
     report = repair_bag(bag)
     assert {path.name: path.read_bytes() for path in bag.iterdir()} == before
-    assert report.destination == tmp_path / "walk_repaired"
+    assert report.destination == tmp_path / "walk.v2_repaired"
     assert report.recovered_messages == 2001
     assert joint_numbers(report.destination) == list(range(2000))
     assert len(describe_bag(report.destination).files) == len(before) - 1
-    assert dict(describe_bag(report.destination).custom_data)["repaired_from"] == "walk"
+    assert dict(describe_bag(report.destination).custom_data)["repaired_from"] == "walk.v2"
     assert [message.topic.qos for message in read_messages(report.destination)][:2] == [
         message.topic.qos for message in read_messages(bag)
     ][:2]

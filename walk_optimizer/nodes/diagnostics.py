@@ -9,12 +9,11 @@ from enum import IntEnum
 
 
 class Level(IntEnum):
-    """How bad a finding is; the numbers of diagnostic_msgs/DiagnosticStatus."""
+    """How bad a finding is; the numbers of diagnostic_msgs/DiagnosticStatus, whose STALE readers conclude."""
 
     OK = 0
     WARN = 1
     ERROR = 2
-    STALE = 3
 
 
 @dataclass(frozen=True)

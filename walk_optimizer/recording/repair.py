@@ -1,10 +1,12 @@
 """Makes a whole bag from what can be trusted of a damaged one, without ROS."""
 
+import contextlib
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 from walk_optimizer.recording.bag_writer import BagWriter
+from walk_optimizer.recording.errors import RecordingError
 from walk_optimizer.recording.info import BagInfo, describe_bag
 from walk_optimizer.recording.records import DamageKind
 from walk_optimizer.recording.scan import FileScan
@@ -53,7 +55,7 @@ def repair_bag(path: Path, destination: Path | None = None) -> RepairReport:
 
     Args:
         path: A bag directory, or a single .mcap file.
-        destination: Bag to create; `<name>_repaired` beside the source when None.
+        destination: Bag to create; by default `<name>_repaired` beside the source, a file without its suffix.
 
     Returns:
         What was saved.
@@ -64,7 +66,7 @@ def repair_bag(path: Path, destination: Path | None = None) -> RepairReport:
         RecordingError: If the destination cannot be written; nothing is left of it then.
     """
     info = describe_bag(path)
-    target = destination or path.absolute().with_name(f"{path.absolute().stem}_repaired")
+    target = destination or _beside(path.absolute())
     custom_data = {**dict(info.custom_data), REPAIRED_FROM_KEY: path.name}
     writer = BagWriter(target, _settings(info), custom_data, info.topics)
     try:
@@ -72,6 +74,8 @@ def repair_bag(path: Path, destination: Path | None = None) -> RepairReport:
         writer.close()
     except BaseException:
         # Half a repaired bag would be one more damaged bag.
+        with contextlib.suppress(RecordingError):
+            writer.close()
         shutil.rmtree(target, ignore_errors=True)
         raise
     return RepairReport(
@@ -83,6 +87,11 @@ def repair_bag(path: Path, destination: Path | None = None) -> RepairReport:
         damaged_records=info.count_damage(DamageKind.RECORD),
         cut_off=info.is_cut_off,
     )
+
+
+def _beside(path: Path) -> Path:
+    """Return where the repaired copy of a bag goes."""
+    return path.with_name(f"{path.stem if path.is_file() else path.name}_repaired")
 
 
 def _settings(info: BagInfo) -> RecorderSettings:
