@@ -31,6 +31,8 @@ from walk_optimizer.solve.worker import WorkerPool
 from walk_optimizer.solve.worker_task import Ticket
 
 LONGEST_TIME_LIMIT = 86_400.0
+# Ends that no request is to blame for: operators shall know.
+_TROUBLE = (Status.WORKER_LOST, Status.EVALUATION_ERROR, Status.SOLVER_ERROR)
 # A client hears of its goal at least this often, also while the solver is silent, in [s].
 _FEEDBACK_PERIOD = 0.5
 
@@ -129,7 +131,7 @@ class GaitOptimizerNode(SuiteNode):
         await self.finished(ticket.future)
         outcome = outcome_of(ticket.future)
         self._health.note(outcome.report)
-        if outcome.report.status is Status.WORKER_LOST:
+        if outcome.report.status in _TROUBLE:
             self.get_logger().warning(outcome.report.message)
         answer.report = report_to_message(outcome.report)
         if outcome.gait is None:
