@@ -105,6 +105,12 @@ class JointLimits:
     torque: tuple[float, ...] = (math.inf,) * len(JOINTS)
     speed: tuple[float, ...] = (math.inf,) * len(JOINTS)
 
+    @property
+    def hip_and_knee_torque(self) -> tuple[float, float]:
+        """Torque limit of a hip and of a knee in [N m], left or right: the legs take turns."""
+        left_hip, left_knee, right_hip, right_knee = self.torque
+        return min(left_hip, right_hip), min(left_knee, right_knee)
+
     def lowered_from(self, former: "JointLimits") -> "JointLimits":
         """Return those limits that are lower than former ones; the others are none."""
         return JointLimits(_lower(self.torque, former.torque), _lower(self.speed, former.speed))

@@ -10,6 +10,7 @@ from walk_optimizer.solve.status import ProgressCallback
 from walk_optimizer.transition.paces import Pace
 from walk_optimizer.transition.solve import plan_transition
 from walk_optimizer.transition.table import TransitionTable
+from walk_optimizer.transition.torque_limit import TorqueLimit, exceeds, hip_and_knee
 
 # Of the worker: what runs beside it, above all a stream of references, goes first.
 _NICENESS = 10
@@ -24,14 +25,14 @@ class TransitionJob:
     Attributes:
         source: What is left.
         target: What is reached.
-        torque_limit: Largest torque in [N m]; may be infinite.
+        torque_limit: Largest torque in [N m], or that of the hips and that of the knees; may be infinite.
         time_limit: In [s].
         folder: Where transitions that are solved are kept; None for the user's cache.
     """
 
     source: Pace
     target: Pace
-    torque_limit: float
+    torque_limit: TorqueLimit
     time_limit: float
     folder: Path | None
 
@@ -75,7 +76,8 @@ def planned(job: TransitionJob, progress: ProgressCallback | None = None) -> Tra
     if outcome.transition is None:
         return TransitionAnswer((), outcome.report.message, "; ".join(problems))
     # A file is named by its paces alone, so only steps that are an optimum without the limit too are kept.
-    if outcome.transition.peak_torques.max() < _FREE * job.torque_limit:
+    hip, knee = hip_and_knee(job.torque_limit)
+    if not exceeds(outcome.transition.steps, (_FREE * hip, _FREE * knee)):
         try:
             table.store(outcome.transition)
         except GaitFileError as error:

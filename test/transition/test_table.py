@@ -119,6 +119,16 @@ def test_a_path_has_the_fewest_steps_and_joins_its_transitions(table, stand, gai
     assert (there[0].source, there[-1].target) == (slowest, fastest)
 
 
+def test_known_steps_are_measured_joint_by_joint(table, stand, gaits):
+    gait = gaits[SPRUNG][-1]
+    known = table.find(stand, gait)
+    hip, knee = known.peak_torques
+    assert min(hip, knee) < 0.9 * max(hip, knee)
+    assert table.find(stand, gait, (hip, knee)) is not None
+    assert table.find(stand, gait, min(hip, knee)) is None
+    assert table.find(stand, gait, (hip, 0.99 * knee)) is None
+
+
 def test_a_path_keeps_a_torque_limit_by_way_of_slower_gaits(table, stand, gaits):
     limit = 60.0
     fast = gaits[SPRUNG][5]

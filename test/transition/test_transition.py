@@ -15,6 +15,7 @@ from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transition.builder import recomputed
 from walk_optimizer.transition.certificate import certify_steps
+from walk_optimizer.transition.files import read_transition_file, write_transition_file
 from walk_optimizer.transition.paces import refined_of
 from walk_optimizer.transition.solve import plan_transition
 from walk_optimizer.transition.transition import Transition
@@ -130,6 +131,21 @@ def test_one_step_keeps_its_torque_limit(walker, gaits):
     assert 19.5 < np.abs(torques).max() <= 20.0
 
 
+def test_hips_and_knees_have_limits_of_their_own(walker, gaits, tmp_path):
+    slow, faster = gaits[SpringMode.NONE][:2]
+    free = plan_transition(walker, slow, faster, steps=1).transition
+    hip, knee = free.peak_torques
+    assert hip > knee
+    bounded = plan_transition(walker, slow, faster, steps=1, torque_limit=(0.9 * hip, np.inf)).transition
+    assert bounded.certificate.certified
+    assert bounded.peak_torques[0] <= 0.9 * hip
+    assert bounded.torque_effort > free.torque_effort
+    tight = replace(bounded, torque_limit=(0.9 * hip, bounded.peak_torques[1] / 2))
+    assert [entry.family for entry in recomputed(tight).failures()] == ["torque_limit"]
+    read = read_transition_file(write_transition_file(bounded, tmp_path), slow, faster)
+    assert read.torque_limit == bounded.torque_limit
+
+
 def test_torques_that_are_too_small_for_it_end_in_a_status_with_a_reason(walker, stand, gaits):
     outcome = plan_transition(
         walker, stand, gaits[SpringMode.NONE][-1], steps=1, torque_limit=3.0, time_limit=20
@@ -160,6 +176,7 @@ def test_requests_that_make_no_sense_are_refused(walker, stand, gaits):
         ((walker, stand, stand), {}, "both are stands"),
         ((walker, stand, gait), {"steps": 0}, "steps is 0, allowed is 1 to 4"),
         ((walker, stand, gait), {"torque_limit": 0.0}, r"torque limit is 0\.0 N m, allowed is above 0"),
+        ((walker, stand, gait), {"torque_limit": (9.0, -1.0)}, r"limit is \(9\.0, -1\.0\) N m, allowed is"),
         ((walker, stand, gait), {"time_limit": -1.0}, r"time limit is -1\.0 s, allowed is above 0"),
         ((walker, stand, replace(gait, refined=None)), {}, "no certified refined part"),
         ((uphill, stand, gait), {}, "level ground"),

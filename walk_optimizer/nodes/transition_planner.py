@@ -4,8 +4,6 @@ from collections import OrderedDict
 from pathlib import Path
 from typing import TypeAlias
 
-import numpy as np
-
 from walk_optimizer.blending import blended
 from walk_optimizer.errors import InvalidRequestError, SolveFailedError, WalkOptimizerError
 from walk_optimizer.gait import RefinedGait
@@ -23,6 +21,7 @@ from walk_optimizer.stand import StandProfile
 from walk_optimizer.transition.paces import Pace, border_state, pace_name, spring_of
 from walk_optimizer.transition.standing import Standing
 from walk_optimizer.transition.table import cache_folder
+from walk_optimizer.transition.torque_limit import TorqueLimit, exceeds, limit_in_words
 from walk_optimizer.transition_job import TransitionJob, transition_job
 from walk_optimizer.walk import StepPlan
 
@@ -71,13 +70,13 @@ class TransitionPlanner:
         if self._ticket is not None:
             self._ticket.cancel()
 
-    async def plan(self, begins: Goal, leads_to: Goal, torque_limit: float) -> Way:
+    async def plan(self, begins: Goal, leads_to: Goal, torque_limit: TorqueLimit) -> Way:
         """Return the steps from one pace to another.
 
         Args:
             begins: The pace that is left.
             leads_to: The pace that follows.
-            torque_limit: Largest torque in [N m]; may be infinite.
+            torque_limit: Largest torque in [N m], or that of the hips and that of the knees; may be infinite.
 
         Raises:
             NoTransitionError: certified steps are wanted, and there are none.
@@ -89,7 +88,7 @@ class TransitionPlanner:
         try:
             steps = await self._steps(begins, leads_to, torque_limit)
         except (InvalidRequestError, SolveFailedError, BusyError) as error:
-            within = f" within {torque_limit:g} N m" if np.isfinite(torque_limit) else ""
+            within = limit_in_words(torque_limit)
             raise NoTransitionError(
                 f"no certified steps from {_name(begins)} to {_name(leads_to)}{within}: {error}; "
                 "try a nearer speed, or set transitions to blended"
@@ -98,7 +97,9 @@ class TransitionPlanner:
         plan = StepPlan(profile_of_goal(begins), profiles, profile_of_goal(leads_to))
         return Way(plan, leads_to, peaks_of_solved(steps))
 
-    async def _steps(self, begins: Goal, leads_to: Goal, torque_limit: float) -> tuple[RefinedGait, ...]:
+    async def _steps(
+        self, begins: Goal, leads_to: Goal, torque_limit: TorqueLimit
+    ) -> tuple[RefinedGait, ...]:
         """Return certified steps.
 
         Raises:
@@ -108,14 +109,16 @@ class TransitionPlanner:
         """
         ends = _ends(begins, leads_to)
         steps = self._known.get(ends)
-        if steps is None or max(peaks_of_solved(steps).torque) > torque_limit:
+        if steps is None or exceeds(steps, torque_limit):
             steps = self._known[ends] = await self._solve(begins, leads_to, torque_limit)
         self._known.move_to_end(ends)
         while len(self._known) > _KEPT:
             self._known.popitem(last=False)
         return steps
 
-    async def _solve(self, begins: Goal, leads_to: Goal, torque_limit: float) -> tuple[RefinedGait, ...]:
+    async def _solve(
+        self, begins: Goal, leads_to: Goal, torque_limit: TorqueLimit
+    ) -> tuple[RefinedGait, ...]:
         source, target = _paces(begins, leads_to)
         folder, limit = self._node.parameters["cache_folder"], self._node.parameters["transition_time_limit"]
         job = TransitionJob(

@@ -125,7 +125,7 @@ class WalkCommands:
         order.require_valid()
         keeping = self._needed(f"to walk at {gait.speed:.4f} m/s", peaks_of_gait(gait.gait))
         stand = self._stand_after(gait)
-        stop = await self._planner.plan(gait, stand, self._torque_limit)
+        stop = await self._planner.plan(gait, stand, self.limits.hip_and_knee_torque)
         stopping = self._needed(f"to stop from {gait.speed:.4f} m/s", stop.peaks | peaks_of([stand]))
         await self._lead_to(StreamedGait.of(gait, stop), order, (keeping, stopping))
         self.refusal = ""
@@ -221,7 +221,7 @@ class WalkCommands:
                 if self._stream.walk.stay(pace.profile):
                     return
                 continue
-            way = await self._planner.plan(pace, goal, self._torque_limit)
+            way = await self._planner.plan(pace, goal, self.limits.hip_and_knee_torque)
             order.require_valid()
             for need in staying:  # Limits may have been lowered meanwhile.
                 self.limits.require(need)
@@ -248,7 +248,3 @@ class WalkCommands:
     def _once_resumed(self) -> str:
         """What has to happen before anything moves; empty for nothing."""
         return _ONCE_RESUMED[self._stream.walk.clock.motion]
-
-    @property
-    def _torque_limit(self) -> float:
-        return min(self.limits.torque)

@@ -16,6 +16,7 @@ FloatArray = NDArray[np.float64]
 
 # The first of the shared variables are K and q_eq, then follows the duration of each phase in [s].
 SPRING_VARIABLES = (0, 1)
+_UNLIMITED = np.full(3, np.inf)
 
 
 class RefinedVariables:
@@ -59,13 +60,13 @@ class RefinedVariables:
         )
 
     def bounds(
-        self, springs: tuple[KneeSpring, KneeSpring], torque_limit: float = np.inf
+        self, springs: tuple[KneeSpring, KneeSpring], torque_limit: FloatArray = _UNLIMITED
     ) -> tuple[FloatArray, FloatArray]:
         """Return the bounds of all variables, scaled.
 
         Args:
             springs: Least and largest K and q_eq.
-            torque_limit: Largest magnitude of each torque in [N m].
+            torque_limit: Largest magnitudes of u1, u2 and u3 in [N m], (3,).
         """
         count, phases = self.mesh.intervals, len(self.mesh.phases)
         states = state_bounds(self.walker)

@@ -57,12 +57,12 @@ class TransitionLimits:
     """What steps between gaits may do.
 
     Attributes:
-        torque: Largest magnitude of each torque in [N m].
+        torque: Largest magnitudes of u1, u2 and u3 in [N m], (3,).
         shortest: Of each step in [s].
         longest: Of each step in [s].
     """
 
-    torque: float
+    torque: FloatArray
     shortest: float
     longest: float
 

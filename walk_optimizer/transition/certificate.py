@@ -30,6 +30,7 @@ from walk_optimizer.transition.paces import (
     velocity,
 )
 from walk_optimizer.transition.standing import Standing
+from walk_optimizer.transition.torque_limit import TorqueLimit, each_torque
 
 FloatArray = NDArray[np.float64]
 
@@ -45,7 +46,7 @@ def certify_steps(
     source: Pace,
     target: Pace,
     steps: Sequence[RefinedGait],
-    torque_limit: float,
+    torque_limit: TorqueLimit,
     *,
     replay: bool = True,
 ) -> tuple[tuple[RefinedGait, ...], Certificate]:
@@ -56,7 +57,7 @@ def certify_steps(
         source: What the first step begins in.
         target: What the last step ends in.
         steps: The steps; their own certificates are not looked at.
-        torque_limit: Largest magnitude of each torque in [N m].
+        torque_limit: Largest magnitude of each torque in [N m], or that of the hips and that of the knees.
         replay: Whether to replay each interval; of steps that were not solved that may take very long,
             and without it there is no certificate to speak of.
     """
@@ -80,7 +81,12 @@ def certify_steps(
 
 
 def _step_entries(
-    walker: WalkerParameters, step: RefinedGait, before: FloatArray, torque_limit: float, *, is_last: bool
+    walker: WalkerParameters,
+    step: RefinedGait,
+    before: FloatArray,
+    torque_limit: TorqueLimit,
+    *,
+    is_last: bool,
 ) -> list[CertificateEntry]:
     """Return the residuals of a step that begins in a state (12,); the last one ends as its target does."""
     trajectory = step.trajectory
@@ -88,7 +94,7 @@ def _step_entries(
     mechanics = mechanics_at(walker, step.spring, nodes[:6], nodes[6:])
     forces = trajectory.forces.reshape(-1, 4).T
     landing = step_length(walker, trajectory.states[-1, -1]) - step.step_length
-    torque = max(0.0, float(torque_peaks(trajectory).max()) - torque_limit)
+    torque = max(0.0, float((torque_peaks(trajectory) - each_torque(torque_limit)).max()))
     return [
         *collocation_entries(walker, trajectory, mechanics),
         *jump_entries(walker, step, before),

@@ -21,6 +21,7 @@ from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.transition.certificate import JOINT_TOLERANCE
 from walk_optimizer.transition.paces import Pace, border_state, pace_name
+from walk_optimizer.transition.torque_limit import TorqueLimit, hip_and_knee
 from walk_optimizer.transition.transition import Transition
 
 TRANSITION_FORMAT = FileFormat(
@@ -84,13 +85,13 @@ def write_transition_file(transition: Transition, folder: Path) -> Path:
     Raises:
         GaitFileError: it can't be written, or a number is not finite.
     """
-    name, limit = TransitionName.of(transition), transition.torque_limit
+    name = TransitionName.of(transition)
     steps = [_Step(step.spring, step.step_length, step.certificate) for step in transition.steps]
     entries = {
         "walker": to_plain(transition.walker),
         "source": name.source,
         "target": name.target,
-        "torque_limit": limit if math.isfinite(limit) else None,
+        "torque_limit": _plain_limit(transition.torque_limit),
         "steps": [to_plain(step) for step in steps],
         "certificate": to_plain(transition.certificate),
     }
@@ -135,15 +136,32 @@ def _transition(
     wrong = sorted(set(arrays) ^ names)
     if wrong:
         raise GaitFileError(f"missing or unknown arrays: {', '.join(wrong)}")
-    limit = header["torque_limit"]
     return Transition(
         walker=walker,
         source=source,
         target=target,
         steps=tuple(_step(number, entry, arrays) for number, entry in enumerate(plain)),
-        torque_limit=math.inf if limit is None else positive(limit, "torque_limit"),
+        torque_limit=_limit(header["torque_limit"]),
         certificate=from_plain(Certificate, header["certificate"], "certificate"),
     )
+
+
+def _plain_limit(limit: TorqueLimit) -> Any:
+    """Return a torque limit for a header: one number, or that of the hips and of the knees; null for none."""
+    numbers = [one if math.isfinite(one) else None for one in hip_and_knee(limit)]
+    return numbers[0] if numbers[0] == numbers[1] else numbers
+
+
+def _limit(plain: Any) -> TorqueLimit:
+    """Return the torque limit of a header."""
+    if isinstance(plain, list) and len(plain) == 2:
+        hip, knee = map(_one_limit, plain)
+        return hip, knee
+    return _one_limit(plain)
+
+
+def _one_limit(plain: Any) -> float:
+    return math.inf if plain is None else positive(plain, "torque_limit")
 
 
 def _check_border(place: str, name: Any, arrays: Mapping[str, NDArray[Any]], pace: Pace) -> None:

@@ -28,6 +28,7 @@ from walk_optimizer.transition.paces import (
 from walk_optimizer.transition.plan import contact_plan
 from walk_optimizer.transition.settings import TransitionSettings, transition_settings
 from walk_optimizer.transition.standing import Standing
+from walk_optimizer.transition.torque_limit import TorqueLimit, each_torque, hip_and_knee
 from walk_optimizer.transition.transition import Transition, TransitionOutcome
 
 FloatArray = NDArray[np.float64]
@@ -48,7 +49,7 @@ def plan_transition(
     target: Pace,
     *,
     steps: int | None = None,
-    torque_limit: float = np.inf,
+    torque_limit: TorqueLimit = np.inf,
     settings: TransitionSettings | None = None,
     solver: SolverSettings | None = None,
     time_limit: float | None = None,
@@ -61,7 +62,8 @@ def plan_transition(
         source: The gait or stand that is left.
         target: The gait or stand that is reached; one of both is a gait.
         steps: Number of steps; None means that of the settings, and one more where that has no solution.
-        torque_limit: Largest magnitude of each torque in [N m], between the nodes of the solve too.
+        torque_limit: Largest magnitude of each torque in [N m], between the nodes of the solve too; or that
+            of the hips and that of the knees.
         settings: Of steps; the packaged ones by default.
         solver: Settings of the solver; the packaged ones by default.
         time_limit: In [s], above 0; the solver settings' by default.
@@ -93,7 +95,7 @@ class _Request:
     walker: WalkerParameters
     source: Pace
     target: Pace
-    torque_limit: float
+    torque_limit: TorqueLimit
     settings: TransitionSettings
     back_end: str
 
@@ -108,7 +110,7 @@ def _check(
     source: Pace,
     target: Pace,
     steps: int | None,
-    torque_limit: float,
+    torque_limit: TorqueLimit,
     time_limit: float,
     settings: TransitionSettings,
 ) -> None:
@@ -123,9 +125,9 @@ def _check(
         spring_of(pace)
     if steps is not None and not (isinstance(steps, int) and 1 <= steps <= settings.most_steps):
         raise InvalidRequestError(f"steps is {steps!r}, allowed is 1 to {settings.most_steps}")
-    for name, value, unit in (("torque limit", torque_limit, "N m"), ("time limit", time_limit, "s")):
-        if not value > 0:
-            raise InvalidRequestError(f"{name} is {value} {unit}, allowed is above 0")
+    hip_and_knee(torque_limit)
+    if not time_limit > 0:
+        raise InvalidRequestError(f"time limit is {time_limit} s, allowed is above 0")
 
 
 class _Solve:
@@ -137,8 +139,8 @@ class _Solve:
         self.plan = contact_plan(request.source, request.target, steps)
         self.phases = tuple(len(phases) for phases in self.plan.steps)
         settings = request.settings
-        limits = TransitionLimits(request.torque_limit, settings.shortest_step, settings.longest_step)
-        self.limits = limits
+        self.torque_limit = each_torque(request.torque_limit)
+        self.limits = TransitionLimits(self.torque_limit, settings.shortest_step, settings.longest_step)
         self.end = end_in(request.target, self.plan)
 
     def run(self) -> TransitionOutcome:
@@ -165,16 +167,18 @@ class _Solve:
             mesh = finer
 
     def _tightened(self, trajectory: RefinedTrajectory) -> bool:
-        """Lower the bound of the torques at the nodes if they exceed their limit between these.
+        """Lower the bounds at the nodes of those torques that exceed their limit between these.
 
         Returns:
-            Whether they do.
+            Whether there are any.
         """
-        peak = float(torque_peaks(trajectory).max())
-        if peak <= self.request.torque_limit:
+        peaks = torque_peaks(trajectory)
+        exceeding = peaks > self.torque_limit
+        if not exceeding.any():
             return False
-        lower = self.limits.torque * self.request.torque_limit / peak
-        self.limits = replace(self.limits, torque=lower * (1 - _TORQUE_MARGIN))
+        torque = self.limits.torque.copy()
+        torque[exceeding] *= (self.torque_limit / peaks * (1 - _TORQUE_MARGIN))[exceeding]
+        self.limits = replace(self.limits, torque=torque)
         return True
 
     def _solved(self, mesh: Mesh, points: RefinedPoints, barrier: float) -> tuple[Status, RefinedPoints]:

@@ -17,6 +17,7 @@ from walk_optimizer.transition.files import TransitionName, read_transition_file
 from walk_optimizer.transition.paces import Pace, pace_name
 from walk_optimizer.transition.settings import transition_settings
 from walk_optimizer.transition.standing import Standing, standing_pose
+from walk_optimizer.transition.torque_limit import TorqueLimit, exceeds
 from walk_optimizer.transition.transition import Transition
 
 
@@ -72,13 +73,14 @@ class TransitionTable:
         """Return a sentence for each file that was set aside; it begins with the path."""
         return list(self._problems.values())
 
-    def find(self, source: Pace, target: Pace, torque_limit: float = np.inf) -> Transition | None:
+    def find(self, source: Pace, target: Pace, torque_limit: TorqueLimit = np.inf) -> Transition | None:
         """Return the transition of fewest steps from one pace to another; None where there is none.
 
         Args:
             source: What is left.
             target: What is reached.
-            torque_limit: Largest magnitude of each torque in [N m]; others are left out.
+            torque_limit: Largest magnitude of each torque in [N m], or that of the hips and that of the
+                knees; others are left out.
         """
         wanted = (pace_name(source), pace_name(target))
         names = [name for name in self._files if (name.source, name.target) == wanted]
@@ -89,7 +91,7 @@ class TransitionTable:
             except GaitFileError as error:
                 self._problems[path] = str(error)
                 continue
-            if transition.peak_torques.max() <= torque_limit:
+            if not exceeds(transition.steps, torque_limit):
                 return transition
         return None
 
@@ -112,7 +114,7 @@ class TransitionTable:
         return path
 
     def path(
-        self, source: Pace, target: Pace, between: Sequence[Pace] = (), torque_limit: float = np.inf
+        self, source: Pace, target: Pace, between: Sequence[Pace] = (), torque_limit: TorqueLimit = np.inf
     ) -> tuple[Transition, ...]:
         """Return transitions that lead one after the other from one pace to another in the fewest steps.
 
@@ -120,7 +122,7 @@ class TransitionTable:
             source: What is left.
             target: What is reached.
             between: Paces that may be walked on the way; source and target need not be among them.
-            torque_limit: Largest magnitude of each torque in [N m]; others are left out.
+            torque_limit: As for `find`.
 
         Raises:
             GaitNotFoundError: no such transitions are solved; the message names both paces.

@@ -10,6 +10,7 @@ from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.refined_peaks import torque_peaks
 from walk_optimizer.solve.status import SolveReport
 from walk_optimizer.transition.paces import Pace
+from walk_optimizer.transition.torque_limit import TorqueLimit
 
 FloatArray = NDArray[np.float64]
 
@@ -32,7 +33,8 @@ class Transition:
         source: What is left.
         target: What is reached.
         steps: The steps, each with a certificate of its own.
-        torque_limit: Largest magnitude of each torque that was allowed, in [N m]; may be infinite.
+        torque_limit: Largest magnitude of each torque that was allowed, in [N m], or that of the hips and
+            that of the knees; may be infinite.
         certificate: The largest residuals of all steps, and how far apart source, steps and target are.
     """
 
@@ -40,7 +42,7 @@ class Transition:
     source: Pace
     target: Pace
     steps: tuple[RefinedGait, ...]
-    torque_limit: float
+    torque_limit: TorqueLimit
     certificate: Certificate
 
     @property
