@@ -29,8 +29,8 @@ from walk_optimizer.recording.topics import INFINITE_NS, QosProfile, TopicInfo
 # Longest wait for what is still under way at the end, in [s].
 _LAST_WORDS = 1.0
 _LONGEST_DELAY = 3600.0
-# Time to find out who else publishes, in [s]: it often takes 2 s and more. Their names come after that.
-_DISCOVERY, _NAME_DELAY = 3.0, 1.0
+# Time to find out who else publishes, in [s]: each tells of itself every 3 s. Names come after that.
+_DISCOVERY, _NAME_DELAY = 4.0, 1.0
 # Topics that every node has, and those that several nodes may share, where somebody asks for that.
 _EVERYBODYS, _SHARED = ("/rosout", "/parameter_events"), ("diagnostics", "tf", "tf_static")
 # What a topic is given whose recording does not tell its history.
@@ -68,7 +68,7 @@ def play_bag(
     Args:
         path: The bag.
         info: What is in it.
-        delay: Time for subscribers to find the player, in [s]; the player looks around for 3 s at the
+        delay: Time for subscribers to find the player, in [s]; the player looks around for 4 s at the
             least.
         topics: Names of the topics wanted; all when None.
         rate: Time of the recording for each time of playing.
