@@ -1,5 +1,7 @@
 """The publisher with real gaits: it walks by certified steps, and refuses what has none."""
 
+import gc
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,8 @@ def test_a_gait_is_stopped_by_the_steps_that_it_was_begun_with(graph, start, tmp
         graph.executor.remove_node(node)
         node.close()
         node.destroy_node()
+        del node
+        gc.collect()  # Or what is left of the node takes the log of the next one of its name with it.
 
 
 def test_what_has_no_certified_steps_is_refused_and_the_stand_goes_on(graph, start, other_walker, tmp_path):
