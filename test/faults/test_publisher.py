@@ -44,7 +44,7 @@ impossible_speeds = st.floats(width=64).filter(
 @pytest.fixture(scope="module")
 def process(start_for_module, other_walker, tmp_path_factory):
     start_for_module("gait_library", **stock(tmp_path_factory.mktemp("stock"), other_walker))
-    return start_for_module(NODE, **BASIC)
+    return start_for_module(NODE, walker_file=other_walker, **BASIC)
 
 
 @pytest.fixture
@@ -150,7 +150,7 @@ def own(graph, start, stocked):
     """A publisher that a test may kill, with its library, apart from the lasting one."""
     start("gait_library", namespace=OWN, **stocked)
     walker = Walker(graph, OWN)
-    walker.process = start(NODE, namespace=OWN, **BASIC)
+    walker.process = start(NODE, namespace=OWN, walker_file=stocked["walker_file"], **BASIC)
     walker.walk(FAST)
     return walker
 
@@ -189,12 +189,12 @@ def test_a_publisher_killed_while_it_records_loses_at_most_a_second(graph, own, 
     assert expected == stamps
 
 
-def test_a_restarted_publisher_begins_with_a_stand(graph, own, start):
+def test_a_restarted_publisher_begins_with_a_stand(graph, own, start, stocked):
     """A publisher that was killed in mid-walk comes back, and its library serves it again."""
     own.process.process.send_signal(signal.SIGKILL)
     own.process.process.wait()
     own.states.clear()
-    start(NODE, namespace=OWN, **BASIC)
+    start(NODE, namespace=OWN, walker_file=stocked["walker_file"], **BASIC)
     own.wait_for("standing")
     own.walk(SLOW)
     answer = graph.call(StopRecording, own.topic("stop_recording"))

@@ -11,7 +11,7 @@ pytest.importorskip("rclpy")
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped, Twist, Vector3
-from nodes.conftest import FAST, SLOW
+from nodes.conftest import FAST, HIP_MASS, SLOW
 from nodes.graph import SETTLING, assert_left_cleanly
 from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
@@ -46,7 +46,7 @@ PATIENT = {"longest_gap": 10.0, "rate": 100.0, "transitions": "blended"}
 @pytest.fixture
 def publisher(start, stocked):
     start("gait_library", **stocked)
-    return start("reference_publisher", **PATIENT)
+    return start("reference_publisher", walker_file=stocked["walker_file"], **PATIENT)
 
 
 def walk(graph, speed=SLOW):
@@ -70,7 +70,7 @@ def stamp_ns(message):
 
 
 def matcher_of(gait):
-    return CycleMatcher(ReceivedGait.from_message(gait, WalkerParameters()).profile)
+    return CycleMatcher(ReceivedGait.from_message(gait, WalkerParameters(hip_mass=HIP_MASS)).profile)
 
 
 def match(matcher, message):
@@ -392,7 +392,8 @@ def test_operators_are_told_why_nothing_is_streamed(graph, start):
 
 def test_operators_are_told_that_no_speed_can_be_walked(graph, start, stocked):
     nowhere_known = 0.5
-    start(NODE, initial_speed=nowhere_known, remaps={"~/cmd_vel": "/robot/velocity"}, **PATIENT)
+    own = {"initial_speed": nowhere_known, "walker_file": stocked["walker_file"]}
+    start(NODE, remaps={"~/cmd_vel": "/robot/velocity"}, **own, **PATIENT)
     heard = graph.subscribe(DiagnosticArray, "/diagnostics")
 
     def told(check, words):
@@ -428,7 +429,8 @@ def test_arguments_that_ros_ignores_are_refused(tmp_path):
 def test_a_simulated_clock_that_jumps_moves_no_reference(graph, start, stocked):
     """Time stands still, runs, is reset, leaps and runs again: the walk holds, or goes on from there."""
     start("gait_library", **stocked)
-    start(NODE, use_sim_time=True, longest_gap=0.2, rate=500.0, transitions="blended")
+    own = {"walker_file": stocked["walker_file"], "transitions": "blended"}
+    start(NODE, use_sim_time=True, longest_gap=0.2, rate=500.0, **own)
     joints = graph.subscribe(JointState, f"{NODE}/joint_reference")
     gaits = graph.subscribe(Gait, f"{NODE}/gait", LATCHED)
     clock = graph.publisher(Clock, "/clock")
@@ -468,7 +470,8 @@ def test_a_simulated_clock_that_jumps_moves_no_reference(graph, start, stocked):
 
 
 def test_it_waits_for_a_library_that_comes_late_also_in_a_namespace(graph, start, stocked):
-    start("reference_publisher", namespace="walker_7", initial_speed=SLOW, **PATIENT)
+    own = {"initial_speed": SLOW, "walker_file": stocked["walker_file"]}
+    start("reference_publisher", namespace="walker_7", **own, **PATIENT)
     graph.client(SetGait, f"walker_7/{NODE}/set_gait")
     joints = graph.subscribe(JointState, f"walker_7/{NODE}/joint_reference")
     start("gait_library", namespace="walker_7", **stocked)

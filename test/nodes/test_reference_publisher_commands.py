@@ -31,7 +31,12 @@ def publisher(start_for_module, other_walker, tmp_path_factory):
     start_for_module("gait_library", **stock(tmp_path_factory.mktemp("stock"), other_walker))
     # A test machine may stall for long; the phase shall then go on with the clock.
     return start_for_module(
-        NODE, longest_gap=10.0, rate=100.0, command_timeout=TIMEOUT, transitions="blended"
+        NODE,
+        walker_file=other_walker,
+        longest_gap=10.0,
+        rate=100.0,
+        command_timeout=TIMEOUT,
+        transitions="blended",
     )
 
 

@@ -34,7 +34,8 @@ def state(graph):
 
 def test_a_manager_decides_when_references_are_streamed(graph, start, stocked, tmp_path):
     start("gait_library", **stocked)
-    node = start(NODE, autostart=False, longest_gap=10.0, transitions="blended")
+    walker_file = stocked["walker_file"]
+    node = start(NODE, autostart=False, longest_gap=10.0, transitions="blended", walker_file=walker_file)
     assert state(graph) == "unconfigured"
     assert change(graph, Transition.TRANSITION_CONFIGURE)
     walker = Walker(graph)
@@ -87,7 +88,8 @@ def test_two_walkers_in_one_graph_walk_each_for_itself(graph, start, stocked):
     names = ("one", "two")
     for name in names:
         start("gait_library", namespace=name, **stocked)
-        start(NODE, namespace=name, longest_gap=10.0, rate=100.0, transitions="blended")
+        own = {"walker_file": stocked["walker_file"], "transitions": "blended"}
+        start(NODE, namespace=name, longest_gap=10.0, rate=100.0, **own)
     one, two = (Walker(graph, name) for name in names)
     joints = [walker.listen(JointState, "joint_reference") for walker in (one, two)]
     one.talk(Float64, "target_speed").publish(Float64(data=SLOW))
