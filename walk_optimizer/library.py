@@ -5,6 +5,7 @@ Owns what happens to files that can't be used. Does not own which gait answers a
 """
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -36,6 +37,9 @@ __all__ = [
     "parse_selection",
     "table_folder",
 ]
+
+# Transitions may be kept in the same folder (`transition.files`); they are no gaits, and no damaged ones.
+_TRANSITION = re.compile(rf".+__.+__\d+steps__.+{re.escape(SUFFIX)}")
 
 
 def table_folder() -> Path:
@@ -189,7 +193,7 @@ def _gait_files(walker: WalkerParameters, folder: Path) -> list[tuple[Path, Sour
         (path, source)
         for place, source in places
         for path in sorted(place.glob(f"*{SUFFIX}"))
-        if not path.name.startswith(".")
+        if not path.name.startswith(".") and not _TRANSITION.fullmatch(path.name)
     ]
 
 
