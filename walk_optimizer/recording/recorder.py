@@ -21,9 +21,9 @@ from walk_optimizer.recording.topics import TopicInfo, require_message, require_
 DROPPED_KEY = "dropped_messages"
 """Key in the custom data of metadata.yaml under which a bag owns up to its gaps."""
 
-# So many messages gather for a rest: a thread that woke up for each would hold up those who write, and one that
-# stored many at once would hold up those who read, on a machine with few processors. Longer than the patience
-# in [s] none waits.
+# So many messages gather for a rest: a thread that woke up for each would hold up those who write, one that
+# stored many at once those who read, on a machine with few processors. None waits longer than the patience
+# in [s].
 _BATCH, _PATIENCE = 9, 0.05
 
 
