@@ -35,20 +35,27 @@ _ROUNDS = 3
 def with_replayable_start(walker: WalkerParameters, request: GaitRequest, gait: RefinedGait) -> RefinedGait:
     """Return the gait with a start from which a replay of its torques ends where it does.
 
-    The gait itself is returned if its replay does so already, or if the other start would cost it the
-    certificate.
+    The gait itself is returned if its replay does so already, if the other start would cost it the
+    certificate, or if the integrator gives up.
 
     Args:
         walker: The walker.
         request: Speed and step that the gait has to meet.
         gait: A certified gait.
     """
-    shadow = _Shadow(walker, gait.spring, gait.trajectory)
-    if shadow.end_error() <= _GOOD_END:
+    try:
+        shadow = _Shadow(walker, gait.spring, gait.trajectory)
+        if shadow.end_error() <= _GOOD_END:
+            return gait
+        moved = replace(gait, trajectory=shadow.trajectory())
+    except _NoEndError:
         return gait
-    moved = replace(gait, trajectory=shadow.trajectory())
     certificate = certify_refined(walker, request, moved)
     return replace(moved, certificate=certificate) if certificate.certified else gait
+
+
+class _NoEndError(Exception):
+    """An integration came to no end."""
 
 
 class _Shadow:
@@ -72,7 +79,7 @@ class _Shadow:
         """Return the step with the start of the closest motion; its first interval is moved along."""
         solution, starts = self._solution, self._closest_starts()
         both = np.stack([starts, solution.states[:, 0]])
-        moved, former = interval_states(*self._replayed, both, NODES, _TOLERANCE)[:, 0]
+        moved, former = self._states(both, NODES, _TOLERANCE)[:, 0]
         shift = np.vstack([starts[0] - solution.states[0, 0], moved - former])
         states, forces = solution.states.copy(), solution.forces.copy()
         states[0] += shift
@@ -99,7 +106,7 @@ class _Shadow:
 
     def _defects(self, starts: FloatArray) -> FloatArray:
         """Return how far from the next start each interval but the last ends, (n - 1, 12)."""
-        ends = interval_states(*self._replayed, starts[None], tolerance=_TOLERANCE)[0, :-1, 0]
+        ends = self._states(starts[None], NODES[-1:], _TOLERANCE)[0, :-1, 0]
         defects: FloatArray = ends + self._jumps - starts[1:]
         return defects
 
@@ -107,5 +114,16 @@ class _Shadow:
         """Return how the end of each interval depends on its start, (n, 12, 12)."""
         shifts = _DIFFERENCE * np.vstack([np.zeros(12), np.eye(12)])
         starts = self._solution.states[:, 0] + shifts[:, None]
-        ends = interval_states(*self._replayed, starts, tolerance=_DIFFERENCE_TOLERANCE)[:, :, 0]
+        ends = self._states(starts, NODES[-1:], _DIFFERENCE_TOLERANCE)[:, :, 0]
         return np.moveaxis((ends[1:] - ends[0]) / _DIFFERENCE, 0, -1)
+
+    def _states(self, starts: FloatArray, places: FloatArray, tolerance: float) -> FloatArray:
+        """Return where all intervals lead from starts (k, n, 12) at m places, (k, n, m, 12).
+
+        Raises:
+            _NoEndError: the integrator gives up.
+        """
+        states = interval_states(*self._replayed, starts, places, tolerance)
+        if not np.isfinite(states).all():
+            raise _NoEndError
+        return states

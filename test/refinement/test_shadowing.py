@@ -1,11 +1,14 @@
 """The start from which torques alone lead through a step."""
 
 from dataclasses import replace
+from itertools import count
+from typing import Any
 
 import numpy as np
 import pytest
 
-from walk_optimizer.gait import Gait
+from walk_optimizer import shadowing
+from walk_optimizer.gait import FloatArray, Gait
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.replay import interval_states, replay_step
@@ -62,6 +65,21 @@ def test_a_start_that_would_cost_the_certificate_is_not_taken() -> None:
     off = spoiled(gait).refined
     assert off is not None
     assert with_replayable_start(gait.walker, demanding, off) is off
+
+
+@pytest.mark.parametrize("ends", [1, 2, 4])
+def test_an_integration_that_comes_to_no_end_leaves_the_step_as_it_is(
+    monkeypatch: pytest.MonkeyPatch, ends: int
+) -> None:
+    off, calls = spoiled(TABLE[0]), count(1)
+
+    def ending(*arguments: Any, **options: Any) -> FloatArray:
+        states = interval_states(*arguments, **options)
+        return np.full_like(states, np.inf) if next(calls) >= ends else states
+
+    monkeypatch.setattr(shadowing, "interval_states", ending)
+    assert off.refined is not None
+    assert with_replayable_start(off.walker, off.request, off.refined) is off.refined
 
 
 def test_intervals_of_several_walkers_are_replayed_like_those_of_one(gait: Gait) -> None:
