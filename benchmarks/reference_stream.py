@@ -4,7 +4,7 @@ Every figure comes from a subscriber in another process: the stamps of the messa
 The lateness of a message is how far its stamp is behind the most punctual ones of the same schedule. A
 second table tells how the stream bears more subscribers, a third how soon a service answers.
 
-    .venv/bin/python benchmarks/reference_stream.py            # 6 minutes; writes docs/benchmarks/
+    .venv/bin/python benchmarks/reference_stream.py            # 9 minutes; writes docs/benchmarks/
     .venv/bin/python benchmarks/reference_stream.py --quick    # to try: half a minute, prints only
 """
 
@@ -387,7 +387,7 @@ def main():
     )
     parser.add_argument("--quick", action="store_true", help="short runs, to try; nothing is saved")
     args = parser.parse_args()
-    text = page((1, 2.0), 20) if args.quick else page((3, 8.0), 200)
+    text = page((1, 2.0), 20) if args.quick else page((5, 8.0), 200)
     print(text)
     if not args.quick:
         PAGE.write_text(text, encoding="utf-8")
