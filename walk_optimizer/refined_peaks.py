@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from walk_optimizer.model.kinematics import KNEE_1, KNEE_2, UPPER_1, UPPER_2
 from walk_optimizer.refined_trajectory import RefinedTrajectory
-from walk_optimizer.transcription.tableau import NODE_COEFFICIENTS, STATE_COEFFICIENTS
 
 FloatArray = NDArray[np.float64]
 
@@ -18,15 +17,12 @@ _JOINTS = (UPPER_1, KNEE_1, UPPER_2, KNEE_2)
 
 def torque_peaks(trajectory: RefinedTrajectory) -> FloatArray:
     """Return the largest magnitudes of u over a step in [N m], (3,)."""
-    return _peaks(np.einsum("kj,njs->nks", NODE_COEFFICIENTS, trajectory.torques))
+    return _peaks(trajectory.motion_polynomials[:, :3, 12:])
 
 
 def speed_peaks(trajectory: RefinedTrajectory) -> FloatArray:
     """Return the largest speeds of upper leg and knee of leg 1, then of leg 2, in [rad/s], (4,)."""
-    angles = trajectory.states[:, :, _JOINTS]
-    cubics = np.einsum("kj,njs->nks", STATE_COEFFICIENTS, angles)
-    rates = np.arange(1, 4)[:, None] * cubics[:, 1:] / trajectory.lengths[:, None, None]
-    return _peaks(rates)
+    return _peaks(trajectory.motion_polynomials[:, :3, 6:12][:, :, _JOINTS])
 
 
 def _peaks(quadratics: FloatArray) -> FloatArray:

@@ -82,8 +82,11 @@ class RefinedTrajectory:
         return coefficients
 
     @cached_property
-    def _motion_polynomials(self) -> FloatArray:
-        """q, qdot and u side by side, (n, 4, 15): a fast loop evaluates all of them by one product."""
+    def motion_polynomials(self) -> FloatArray:
+        """Coefficients of powers, lowest first, of q, qdot and u side by side, (n, 4, 15).
+
+        A fast loop evaluates all of them by one product. Those of qdot and u have no cubes.
+        """
         q = self._state_polynomials[:, :, :6]
         qdot, u = np.zeros_like(q), np.zeros((self.intervals, 4, 3))
         qdot[:, :3] = np.arange(1, 4)[:, None] * q[:, 1:] / self.lengths[:, None, None]
@@ -110,7 +113,7 @@ class RefinedTrajectory:
     def motion(self, index: int, place: float) -> FloatArray:
         """Return q, qdot (the derivative of the polynomial q) and u, (15,), at a place of an interval."""
         powers = np.array([1.0, place, place**2, place**3])
-        values: FloatArray = powers @ self._motion_polynomials[index]
+        values: FloatArray = powers @ self.motion_polynomials[index]
         return values
 
     def torque(self, index: int, place: float) -> FloatArray:
