@@ -37,7 +37,7 @@ from walk_optimizer.phase_clock import Motion
 from walk_optimizer.request import GaitRequest
 
 # The executor may hold Python's lock for that long in [s], several times a tick; the usual is 5 ms.
-_SWITCH_INTERVAL = 0.0001
+_SWITCH_INTERVAL = 0.00003
 
 
 class ReferencePublisherNode(ManagedNode):

@@ -1,6 +1,7 @@
 """The bounded queue between those who publish and the thread that writes."""
 
 import threading
+import time
 from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
@@ -73,17 +74,19 @@ class Inbox(Generic[Item]):
         if len(self._items) >= self._batch:
             self._resting.set()
 
-    def take(self, patience: float) -> tuple[list[Item], bool]:
+    def take(self, patience: float, pause: float = 0.0) -> tuple[list[Item], bool]:
         """Wait for a rest with a batch of items, and take all of them; if the queue is closed, at once.
 
         Args:
             patience: Longest wait in [s].
+            pause: How long to leave the processors to others when a rest begins, in [s].
 
         Returns:
             The items in their order, maybe none; and whether the queue was closed by then, so that no
             further ones follow.
         """
-        self._resting.wait(patience)
+        if self._resting.wait(patience) and not self.closed:
+            time.sleep(pause)
         self._resting.clear()
         with self._lock:
             items, self._items = self._items, []

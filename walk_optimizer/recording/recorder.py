@@ -22,9 +22,9 @@ DROPPED_KEY = "dropped_messages"
 """Key in the custom data of metadata.yaml under which a bag owns up to its gaps."""
 
 # So many messages gather for a rest: a thread that woke up for each would hold up those who write, one that
-# stored many at once those who read, on a machine with few processors. None waits longer than the patience
-# in [s].
-_BATCH, _PATIENCE = 9, 0.05
+# stored many at once those who read, on a machine with few processors. Readers have just been woken up when
+# a rest begins: they have the pause to themselves. No message waits longer than the patience. In [s].
+_BATCH, _PAUSE, _PATIENCE = 9, 0.0002, 0.05
 
 
 class RecorderLog(Protocol):
@@ -213,7 +213,7 @@ class Recorder:
         next_flush = time.monotonic() + self.settings.flush_period
         closed = False
         while not closed:
-            items, closed = self._take(_PATIENCE)
+            items, closed = self._take(_PATIENCE, _PAUSE)
             for item in items:
                 self._store(writer, item)
             if time.monotonic() >= next_flush:
@@ -222,9 +222,9 @@ class Recorder:
                 next_flush = time.monotonic() + self.settings.flush_period
             self._note_progress(writer)
 
-    def _take(self, patience: float = 0.0) -> tuple[list[_Entry | TopicInfo], bool]:
+    def _take(self, patience: float = 0.0, pause: float = 0.0) -> tuple[list[_Entry | TopicInfo], bool]:
         """Take what waits in the queue, and count the messages that are from now on ours to store."""
-        items, closed = self._inbox.take(patience)
+        items, closed = self._inbox.take(patience, pause)
         self._taken += sum(isinstance(item, _Entry) for item in items)
         return items, closed
 
