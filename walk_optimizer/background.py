@@ -54,4 +54,4 @@ def outcome_of(future: "Future[Outcome]") -> Outcome:
     except SolveStoppedError as error:
         return Outcome(None, error.report)
     except SolveFailedError as error:
-        return Outcome(None, SolveReport(Status.EVALUATION_ERROR, str(error), back_end=""))
+        return Outcome(None, SolveReport(Status.SOLVER_ERROR, str(error), back_end=""))

@@ -5,13 +5,18 @@ Owns what happens to files that can't be used. Does not own which gait answers a
 """
 
 import os
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from walk_optimizer.errors import GaitFileError, GaitNotFoundError, GaitNotWritableError
 from walk_optimizer.gait import Gait
-from walk_optimizer.gait_files import SUFFIX, gait_file_name, read_gait_file, write_gait_file
+from walk_optimizer.gait_files import (
+    SUFFIX,
+    gait_file_name,
+    read_gait_file,
+    transition_name_parts,
+    write_gait_file,
+)
 from walk_optimizer.gait_files.access import writable_folder
 from walk_optimizer.gait_files.codec import encode
 from walk_optimizer.library_entries import GaitSummary, LibraryEntry, Source, summarize, table_order
@@ -37,9 +42,6 @@ __all__ = [
     "parse_selection",
     "table_folder",
 ]
-
-# Transitions may be kept in the same folder (`transition.files`); they are no gaits, and no damaged ones.
-_TRANSITION = re.compile(rf".+__.+__\d+steps__.+{re.escape(SUFFIX)}")
 
 
 def table_folder() -> Path:
@@ -193,7 +195,7 @@ def _gait_files(walker: WalkerParameters, folder: Path) -> list[tuple[Path, Sour
         (path, source)
         for place, source in places
         for path in sorted(place.glob(f"*{SUFFIX}"))
-        if not path.name.startswith(".") and not _TRANSITION.fullmatch(path.name)
+        if not path.name.startswith(".") and transition_name_parts(path.name) is None
     ]
 
 

@@ -66,6 +66,6 @@ def test_what_went_wrong_within_a_worker_is_logged_too(graph, optimizer, told, m
     failed.set_exception(SolveFailedError("the solve failed unexpectedly: ValueError()"))
     monkeypatch.setattr(gait_optimizer, "outcome_of", lambda _: outcome_of(failed))
     answer = graph.call(OptimizeGait, "gait_optimizer/optimize_gait", **FIELDS)
-    assert (answer.success, answer.report.status) == (False, "evaluation_error")
+    assert (answer.success, answer.report.status) == (False, "solver_error")
     assert "the solve failed unexpectedly: ValueError()" in answer.message
     graph.spin_until(lambda: answer.report.message in [one.msg for one in told], "the log")

@@ -217,6 +217,13 @@ def test_an_exception_is_an_answer(pool, words, message):
     assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
 
 
+def test_where_a_mistake_was_made_is_told_on_the_error_stream(capfd, pool):
+    pool.submit("raise unknown", FOREVER).future.exception(PATIENCE)
+    told = capfd.readouterr().err
+    assert "Traceback" in told
+    assert "surprise" in told
+
+
 def test_close_ends_everything(pool):
     progress = FirstProgress()
     running = pool.submit("sleep", FOREVER, progress)

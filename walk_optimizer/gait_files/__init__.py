@@ -4,6 +4,12 @@ Owns the bytes of a file and how they reach the disk. Does not own which folder 
 gait answers a request: that is the library's.
 """
 
-from walk_optimizer.gait_files.files import SUFFIX, gait_file_name, read_gait_file, write_gait_file
+from walk_optimizer.gait_files.files import (
+    SUFFIX,
+    gait_file_name,
+    read_gait_file,
+    transition_name_parts,
+    write_gait_file,
+)
 
-__all__ = ["SUFFIX", "gait_file_name", "read_gait_file", "write_gait_file"]
+__all__ = ["SUFFIX", "gait_file_name", "read_gait_file", "transition_name_parts", "write_gait_file"]

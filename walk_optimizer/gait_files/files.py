@@ -22,6 +22,28 @@ def gait_file_name(gait: Gait) -> str:
     )
 
 
+def transition_file_name(source: str, target: str, steps: int, walker: str) -> str:
+    """Return the name of a transition's file, which may be kept among gaits.
+
+    Args:
+        source: Name of the pace that is left.
+        target: Name of the pace that is reached.
+        steps: Number of steps.
+        walker: Beginning of the walker's fingerprint.
+    """
+    return f"{source}__{target}__{steps}steps__{walker}{SUFFIX}"
+
+
+def transition_name_parts(name: str) -> tuple[str, str, int, str] | None:
+    """Return what `transition_file_name` was given; None for the name of any other file."""
+    parts = name.removesuffix(SUFFIX).split("__")
+    if not name.endswith(SUFFIX) or len(parts) != 4:
+        return None
+    source, target, steps, walker = parts
+    number = steps.removesuffix("steps")
+    return (source, target, int(number), walker) if number.isdecimal() else None
+
+
 def write_gait_file(gait: Gait, path: Path) -> None:
     """Write a gait file; a crash leaves either the former file or the whole new one.
 

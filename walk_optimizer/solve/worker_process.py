@@ -1,6 +1,7 @@
 """What runs inside a worker process: jobs come in and events go out, over one pipe."""
 
 import contextlib
+import logging
 import multiprocessing
 import os
 import signal
@@ -14,6 +15,7 @@ from typing import Any
 from walk_optimizer.errors import WalkOptimizerError
 from walk_optimizer.solve.status import Progress, ProgressCallback
 
+_LOGGER = logging.getLogger(__name__)
 # A solver iterates faster than anybody can read: at most one progress event in this time, in [s].
 PROGRESS_PERIOD = 0.1
 
@@ -65,7 +67,8 @@ def _run(function: Function, job: Any, connection: "Connection[Any, Any]") -> Fi
         return Failed(str(error))
     except OSError:
         raise
-    except Exception as error:  # noqa: BLE001  # whatever it is, the next job can still be done
+    except Exception as error:  # whatever it is, the next job can still be done
+        _LOGGER.exception("the solve failed unexpectedly:")
         return Failed(f"the solve failed unexpectedly: {error!r}")
 
 

@@ -14,7 +14,7 @@ from walk_optimizer.gait import Certificate, RefinedGait
 from walk_optimizer.gait_files.access import read_limited, replace_file
 from walk_optimizer.gait_files.checks import check_shape, positive
 from walk_optimizer.gait_files.container import LARGEST_FILE, FileFormat, packed, unpacked
-from walk_optimizer.gait_files.files import SUFFIX, check_walker
+from walk_optimizer.gait_files.files import check_walker, transition_file_name, transition_name_parts
 from walk_optimizer.gait_files.header import from_plain, to_plain
 from walk_optimizer.gait_files.refined import REFINED_PREFIX, refined_trajectory
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
@@ -68,15 +68,14 @@ class TransitionName:
     @classmethod
     def parse(cls, path: Path, walker: WalkerParameters) -> "TransitionName | None":
         """Return what a path says; None for files that are none of this walker's transitions."""
-        parts = path.name.removesuffix(SUFFIX).split("__")
-        if not path.name.endswith(SUFFIX) or len(parts) != 4 or parts[3] != walker.fingerprint()[:8]:
+        parts = transition_name_parts(path.name)
+        if parts is None or parts[3] != walker.fingerprint()[:8]:
             return None
-        number = parts[2].removesuffix("steps")
-        return cls(parts[0], parts[1], int(number)) if number.isdecimal() else None
+        return cls(*parts[:3])
 
     def file_name(self, walker: WalkerParameters) -> str:
         """Return the name of the file for a walker."""
-        return f"{self.source}__{self.target}__{self.steps}steps__{walker.fingerprint()[:8]}{SUFFIX}"
+        return transition_file_name(self.source, self.target, self.steps, walker.fingerprint()[:8])
 
 
 def write_transition_file(transition: Transition, folder: Path) -> Path:
