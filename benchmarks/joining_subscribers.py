@@ -3,7 +3,7 @@
 Three subscribers at a time join a bare rclpy publisher of 500 Hz, and our publisher, while one that joined
 long before listens on. All are processes of their own, over shared memory and over UDP.
 
-    .venv/bin/python benchmarks/joining_subscribers.py    # 8 minutes; writes docs/benchmarks/
+    .venv/bin/python benchmarks/joining_subscribers.py    # 4 minutes; writes docs/benchmarks/
 """
 
 import os
@@ -22,7 +22,7 @@ from walk_optimizer.cli.processes import isolated_environment
 
 PAGE = Path(__file__).parent.parent / "docs" / "benchmarks" / "joining_subscribers.md"
 RATE = 500.0
-TOGETHER, TIMES = 3, 13
+TOGETHER, TIMES = 3, 8
 # Heartbeats come every 3 s: that long after joining all has been opened that will be, in [s].
 LISTENING = 5.0
 # In [s]. A subscriber that the kernel holds up is late by less.
