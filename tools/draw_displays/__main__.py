@@ -1,10 +1,10 @@
-"""Draw what RViz and Foxglove show of a walk, from messages of the running nodes.
+"""Draw what RViz shows of a walk, from messages of the running nodes.
 
     .venv/bin/python tools/draw_displays docs/images
 
 Starts the nodes as processes, has them walk, records what they publish, and draws the last instant as
-rviz/walker.rviz and foxglove/walker.json say: their topics, camera, colours, panels. Neither program is run;
-fonts and shading are matplotlib's.
+rviz/walker.rviz says: its topics, camera, colours, panels. RViz is not run; fonts and shading are
+matplotlib's.
 """
 
 from __future__ import annotations
@@ -12,23 +12,20 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pages import draw_foxglove, draw_rviz
+from pages import draw_rviz
 from recording import record
 
 
 def main() -> None:
-    """Record, and draw both pictures."""
+    """Record, and draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="where rviz.png and foxglove.png go")
+    parser.add_argument("folder", type=Path, help="where rviz.png goes")
     folder = parser.parse_args().folder
     recording = record()
     if not recording.markers:
         raise SystemExit("nothing was received")
     draw_rviz(recording, folder / "rviz.png")
-    draw_foxglove(recording, folder / "foxglove.png")
-    print(
-        f"{folder / 'rviz.png'}, {folder / 'foxglove.png'}: {len(recording.references)} references received"
-    )
+    print(f"{folder / 'rviz.png'}: {len(recording.references)} references received")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The cameras of RViz and Foxglove."""
+"""The camera of RViz."""
 
 from __future__ import annotations
 
@@ -42,12 +42,3 @@ def rviz_camera(view: dict[str, Any], recording: Recording) -> Camera:
     yaw, pitch = view["Yaw"], view["Pitch"]
     away = np.array([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)])
     return Camera(target + view["Distance"] * away, target)
-
-
-def foxglove_camera(panel: dict[str, Any], recording: Recording) -> Camera:
-    """Return the camera of a 3D panel that follows a frame."""
-    state = panel["cameraState"]
-    target = recording.placement(panel["followTf"])[:3, 3] + state["targetOffset"]
-    phi, theta = np.radians(state["phi"]), np.radians(state["thetaOffset"])
-    away = np.array([np.sin(phi) * -np.sin(theta), -np.sin(phi) * np.cos(theta), np.cos(phi)])
-    return Camera(target + state["distance"] * away, target)

@@ -24,6 +24,7 @@ from walk_optimizer_interfaces.srv import GetGait, SetGait
 
 from walk_optimizer.cli.processes import NodeProcess, isolated_environment
 from walk_optimizer.nodes.qos import LATCHED, STREAM
+from walk_optimizer.request import gait_table_settings
 
 FloatArray = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ NODES = {
     "reference_publisher": ("-p", "transitions:=blended"),
     "walker_visualizer": (),
 }
-SPEED, MODE = 0.5338, "stiffness_and_equilibrium"
+SPEED, MODE = gait_table_settings().table_speeds()[3], "stiffness_and_equilibrium"
 # Room for the recorder to stall, so that plots have no gaps of its making.
 DEEP = QoSProfile(depth=5000)
 # Long enough for a start from standing, and for the plots, [s].
