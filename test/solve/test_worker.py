@@ -1,5 +1,6 @@
 import errno
 import math
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -13,6 +14,7 @@ from solve.worker_jobs import work
 
 from walk_optimizer.errors import SolveFailedError
 from walk_optimizer.solve import worker as worker_module
+from walk_optimizer.solve import worker_process
 from walk_optimizer.solve.status import Status
 from walk_optimizer.solve.worker import BusyError, PoolState, WorkerPool
 from walk_optimizer.solve.worker_task import SolveStoppedError
@@ -217,11 +219,11 @@ def test_an_exception_is_an_answer(pool, words, message):
     assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
 
 
-def test_where_a_mistake_was_made_is_told_on_the_error_stream(capfd, pool):
-    pool.submit("raise unknown", FOREVER).future.exception(PATIENCE)
-    told = capfd.readouterr().err
-    assert "Traceback" in told
-    assert "surprise" in told
+def test_where_a_mistake_was_made_is_logged(caplog):
+    _, connection = multiprocessing.Pipe()
+    assert isinstance(worker_process._run(work, "raise unknown", connection), worker_process.Failed)
+    assert "Traceback" in caplog.text
+    assert "surprise" in caplog.text
 
 
 def test_close_ends_everything(pool):
