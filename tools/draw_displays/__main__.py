@@ -24,8 +24,9 @@ def main() -> None:
     recording = record()
     if not recording.markers:
         raise SystemExit("nothing was received")
-    draw_rviz(recording, folder / "rviz.png")
-    print(f"{folder / 'rviz.png'}: {len(recording.references)} references received")
+    path = folder / "rviz.png"
+    draw_rviz(recording, path)
+    print(path)
 
 
 if __name__ == "__main__":

@@ -15,8 +15,6 @@ import rclpy
 from numpy.typing import NDArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -35,9 +33,7 @@ NODES = {
     "walker_visualizer": (),
 }
 SPEED, MODE = gait_table_settings().table_speeds()[3], "stiffness_and_equilibrium"
-# Room for the recorder to stall, so that plots have no gaps of its making.
-DEEP = QoSProfile(depth=5000)
-# Long enough for a start from standing, and for the plots, [s].
+# Long enough for a start from standing, and for the paths that the feet have walked, [s].
 WALKING = 8.0
 PATIENCE = 300.0
 
@@ -50,13 +46,11 @@ class Recording:
         description: The URDF.
         transforms: Last transform of each frame: parent and 4 x 4 matrix.
         markers: Last markers by namespace and number.
-        references: All joint references.
     """
 
     description: str = ""
     transforms: dict[str, tuple[str, FloatArray]] = field(default_factory=dict)
     markers: dict[tuple[str, int], Marker] = field(default_factory=dict)
-    references: list[JointState] = field(default_factory=list)
 
     def take_description(self, message: String) -> None:
         """Keep the URDF."""
@@ -125,7 +119,6 @@ def record() -> Recording:
             (String, "robot_description", recording.take_description, LATCHED),
             (TFMessage, "tf", recording.take_transforms, STREAM),
             (MarkerArray, "walker_visualizer/markers", recording.take_markers, STREAM),
-            (JointState, "reference_publisher/joint_reference", recording.references.append, DEEP),
         ):
             node.create_subscription(kind, name, take, qos)
         _walk(node, executor)
