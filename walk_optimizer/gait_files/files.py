@@ -37,7 +37,7 @@ def transition_file_name(source: str, target: str, steps: int, walker: str) -> s
 def transition_name_parts(name: str) -> tuple[str, str, int, str] | None:
     """Return what `transition_file_name` was given; None for the name of any other file."""
     parts = name.removesuffix(SUFFIX).split("__")
-    if not name.endswith(SUFFIX) or len(parts) != 4:
+    if not name.endswith(SUFFIX) or len(parts) != 4 or not parts[2].endswith("steps"):
         return None
     source, target, steps, walker = parts
     number = steps.removesuffix("steps")
