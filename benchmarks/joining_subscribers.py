@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from report import machine, table
-from stream_graph import PUBLISHER, helper, noted, running, walking_publisher
+from stream_graph import BARE_TOPIC, TOPIC, helper, noted, running, walking_publisher
 
 from walk_optimizer.cli.processes import isolated_environment
 
@@ -57,7 +57,7 @@ def joined(topic: str) -> tuple[list[list[float]], list[float]]:
 def bare() -> Iterator[str]:
     """Run the bare publisher; the context is its topic."""
     with running("bare", "--rate", str(RATE)):
-        yield "/bare/joint_reference"
+        yield BARE_TOPIC
 
 
 @contextmanager
@@ -65,7 +65,7 @@ def ours() -> Iterator[str]:
     """Run our publisher; the context is its topic."""
     with tempfile.TemporaryDirectory() as name, walking_publisher(Path(name), os.environ) as (client, _):
         client.set_rate(RATE)
-        yield f"/{PUBLISHER}/joint_reference"
+        yield TOPIC
 
 
 def line(transport: str, publisher: str, topic: str) -> list[str]:

@@ -17,7 +17,7 @@ import numpy as np
 from report import machine, table
 from std_srvs.srv import Trigger
 from stream_figures import Runs
-from stream_graph import GAIT, LIBRARY, PUBLISHER, measured, recorded, running, walking_publisher
+from stream_graph import BARE_TOPIC, GAIT, LIBRARY, TOPIC, measured, recorded, running, walking_publisher
 from walk_optimizer_interfaces.srv import GetGait
 
 from walk_optimizer.cli.processes import isolated_environment
@@ -36,21 +36,21 @@ def bare_round(seconds):
     found = {}
     for rate, count in CASES:
         with running("bare", "--rate", str(rate)) as process:
-            found[rate, count] = measured(process.pid, "/bare/joint_reference", rate, count, seconds)
+            found[rate, count] = measured(process.pid, BARE_TOPIC, rate, count, seconds)
     return found
 
 
 def publisher_round(seconds, folder):
     """Return the figures of the publisher in each case, and by rates while it records."""
-    topic, found, recording = f"/{PUBLISHER}/joint_reference", {}, {}
+    found, recording = {}, {}
     with walking_publisher(folder, os.environ) as (client, pid):
         for rate, count in CASES:
             client.set_rate(rate)
-            found[rate, count] = measured(pid, topic, rate, count, seconds)
+            found[rate, count] = measured(pid, TOPIC, rate, count, seconds)
         for rate in RATES:
             client.set_rate(rate)
             with recorded(client, folder / f"bag_{rate:.0f}"):
-                recording[rate, 1] = measured(pid, topic, rate, 1, seconds)
+                recording[rate, 1] = measured(pid, TOPIC, rate, 1, seconds)
     return found, recording
 
 

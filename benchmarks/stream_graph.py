@@ -24,6 +24,7 @@ from walk_optimizer.cli.processes import NodeProcess
 from walk_optimizer.nodes.qos import LATCHED
 
 PUBLISHER, LIBRARY = "reference_publisher", "gait_library"
+TOPIC, BARE_TOPIC = f"/{PUBLISHER}/joint_reference", "/bare/joint_reference"
 # A gait of the packaged table.
 GAIT = {"speed": 0.25 / 0.785, "spring_mode": "stiffness_and_equilibrium"}
 # A service that we know may not know us yet, in [s].
