@@ -1,5 +1,6 @@
 """Independent solves are shared out between processes, and come back as if one had done them."""
 
+import ctypes
 import multiprocessing
 import multiprocessing.connection
 import os
@@ -71,6 +72,41 @@ def test_a_stop_ends_the_forks_at_once():
     assert time.monotonic() - begin < 10
     assert 1 <= len(results) < 100
     assert running_children() == []
+
+
+@pytest.mark.parametrize("parent_ends", ["before the fork's first line", "while the fork works"])
+def test_a_fork_ends_with_a_parent_that_is_killed(monkeypatch, parent_ends):
+    receiver, sender = multiprocessing.Pipe(duplex=False)
+    load_library = ctypes.CDLL
+
+    def load_library_late(name):
+        while parent_ends.startswith("before") and os.getppid() == parent:
+            time.sleep(0.001)
+        return load_library(name)
+
+    def work():
+        sender.send("works")
+        time.sleep(60)
+
+    parent = os.fork()
+    if parent == 0:
+        parent = os.getpid()
+        monkeypatch.setattr(sharing.ctypes, "CDLL", load_library_late)
+        sharing.start_fork(work)
+        time.sleep(60)
+        os._exit(0)
+    sender.close()
+    if parent_ends.startswith("while"):
+        assert receiver.poll(10)
+        assert receiver.recv() == "works"
+    else:
+        time.sleep(0.2)
+    os.kill(parent, signal.SIGKILL)
+    os.waitpid(parent, 0)
+    # The pipe ends once nobody has it open.
+    assert receiver.poll(10)
+    with pytest.raises(EOFError):
+        receiver.recv()
 
 
 def test_the_session_maps_in_order_and_counts_all_iterations(session):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from walk_optimizer.solve.back_end import ended
-from walk_optimizer.solve.sharing import die_with_parent, start_fork
+from walk_optimizer.solve.sharing import start_fork
 from walk_optimizer.solve.solution import FloatArray, IterationState, Monitor, Solution
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription.program import Problem
@@ -60,7 +60,6 @@ def _received(receiver: "Connection[Any, Any]", at_start: Solution) -> Solution:
 
 
 def _run(function: Callable[[], Solution], sender: "Connection[Any, Any]") -> None:
-    die_with_parent()
     try:
         one = function()
     except Exception as error:  # noqa: BLE001  # whatever the solver raised, the parent is told

@@ -22,21 +22,29 @@ _PR_SET_PDEATHSIG = 1
 _OTHERS: ContextVar[int] = ContextVar("others", default=0)
 
 
-def die_with_parent() -> None:
-    """Have the kernel kill this fork when its parent ends: a parent that is killed can't do it any more."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    # Ctrl-C in a terminal is the parent's to deal with.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 def start_fork(target: Callable[..., None], *arguments: Any) -> BaseProcess:
-    """Start a fork of this process, which has all that was built here without building it again."""
-    process = multiprocessing.get_context("fork").Process(target=target, args=arguments)
+    """Start a fork of this process, which has all that was built here without building it again.
+
+    It lives no longer than this process, even if this one is killed.
+    """
+    process = multiprocessing.get_context("fork").Process(
+        target=_run_in_fork, args=(os.getpid(), target, *arguments)
+    )
     with warnings.catch_warnings():
         # Only this thread's memory is used in the child, whatever other threads there are.
         warnings.simplefilter("ignore", DeprecationWarning)
         process.start()
     return process
+
+
+def _run_in_fork(parent: int, target: Callable[..., None], *arguments: Any) -> None:
+    # A parent that is killed can't end its forks any more; the kernel can.
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # It ended before the kernel was asked.
+        return
+    # Ctrl-C in a terminal is the parent's to deal with.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    target(*arguments)
 
 
 class Shares(Generic[_One]):
@@ -104,7 +112,6 @@ class Shares(Generic[_One]):
         return process, receiver
 
     def _run(self, sender: "Connection[Any, Any]") -> None:
-        die_with_parent()
         # What fails here is done once more by the parent, where it can be told what it was.
         with contextlib.suppress(Exception):
             sender.send(self._taken(lambda: False))
