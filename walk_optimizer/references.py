@@ -33,6 +33,8 @@ EXCHANGED_JOINTS = ("right_hip", "right_knee", "left_hip", "left_knee")
 _LEFT_IS_STANCE = np.array([UPPER_1, KNEE_1, UPPER_2, KNEE_2])
 _LEFT_IS_SWING = np.array([UPPER_2, KNEE_2, UPPER_1, KNEE_1])
 _BASE = np.array([HIP_X, HIP_Y])
+# Points per second of a cycle that memory is taken for, in [Hz].
+_HIGHEST_RATE = 10_000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,14 +115,23 @@ def cycle_reference(profile: StepProfile, time: float) -> Reference:
     return make_reference(profile.sample(local), step, local, step * profile.step_length)
 
 
+def require_rate(rate: float, highest: float) -> None:
+    """Refuse a number of points per second in [Hz] that is not in 1 to `highest`.
+
+    Raises:
+        InvalidRequestError: says what is allowed.
+    """
+    if not 1 <= rate <= highest:
+        raise InvalidRequestError(f"rate is {rate:g} Hz, allowed is 1 to {highest:g} Hz")
+
+
 def sample_cycle(profile: StepProfile, rate: float) -> Cycle:
     """Return a full cycle with at least `rate` points per second in [Hz].
 
     Raises:
         InvalidRequestError: the rate is not in 1 to 10000 Hz.
     """
-    if not 1 <= rate <= 10_000:
-        raise InvalidRequestError(f"rate is {rate:g} Hz, allowed is 1 to 10000 Hz")
+    require_rate(rate, _HIGHEST_RATE)
     duration = 2 * profile.step_time
     times = np.linspace(0.0, duration, math.ceil(duration * rate) + 1)
     references = [cycle_reference(profile, time) for time in times.tolist()]

@@ -168,10 +168,9 @@ def test_refusals_say_what_the_core_says(graph, publisher):
     answer = graph.call(StopRecording, f"{NODE}/stop_recording")
     assert (answer.success, answer.message) == (False, "nothing is being recorded")
     walk(graph)
-    answer = graph.call(GetJointTrajectory, f"{NODE}/joint_trajectory", rate=-5.0)
-    assert (answer.success, "rate is -5 Hz" in answer.message) == (False, True)
-    answer = graph.call(GetJointTrajectory, f"{NODE}/joint_trajectory", rate=1001.0)
-    assert (answer.success, answer.message) == (False, "rate is 1001 Hz, allowed is 1 to 1000 Hz")
+    for rate in (-5.0, 1001.0):
+        answer = graph.call(GetJointTrajectory, f"{NODE}/joint_trajectory", rate=rate)
+        assert (answer.success, answer.message) == (False, f"rate is {rate:g} Hz, allowed is 1 to 1000 Hz")
 
 
 def test_cycles_are_made_while_others_are_answered(graph, publisher):

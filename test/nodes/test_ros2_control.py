@@ -1,5 +1,6 @@
 """The ros2_control files name parameters that the controllers have, and take what the publisher sends."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ pytest.importorskip("rclpy")
 
 from library.made_up_gait import made_up_gait, with_refinement
 
-from walk_optimizer.nodes.cycle_message import cycle_to_message
+from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.nodes.cycle_message import CycleMessages, cycle_to_message
 from walk_optimizer.profile import profile_of
 from walk_optimizer.references import JOINTS, sample_cycle
 from walk_optimizer.resources import config_file
@@ -93,6 +95,14 @@ def test_the_trajectory_is_one_that_the_controller_takes(order):
     position_only = controller | {"command_interfaces": ["position"]}
     assert refusals(cycle_to_message(cycle, order), position_only) == ["effort"]
     assert refusals(cycle_to_message(cycle, order, effort=False), position_only) == []
+
+
+@pytest.mark.parametrize("rate", [0.5, -5.0, math.nan, 1000.1])
+def test_every_rate_that_is_refused_hears_the_same_limits(rate):
+    cycles = CycleMessages()
+    with pytest.raises(InvalidRequestError, match=f"rate is {rate:g} Hz, allowed is 1 to 1000 Hz"):
+        cycles.make(profile_of(with_refinement(made_up_gait())), rate, JOINTS, effort=True)
+    cycles.close()
 
 
 def test_the_columns_of_the_trajectory_follow_its_names():

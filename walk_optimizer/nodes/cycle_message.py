@@ -7,10 +7,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from builtin_interfaces.msg import Duration
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.nodes.conversions import doubles
 from walk_optimizer.profile import StepProfile
-from walk_optimizer.references import JOINTS, Cycle, sample_cycle
+from walk_optimizer.references import JOINTS, Cycle, require_rate, sample_cycle
 from walk_optimizer.solve.worker import BusyError
 
 # Controllers interpolate between the points. To send more of them would hold up the stream.
@@ -33,11 +32,10 @@ class CycleMessages:
         """Return what will be the cycle of a gait, with so many points per second in [Hz].
 
         Raises:
-            InvalidRequestError: the rate is too high.
+            InvalidRequestError: the rate is out of range.
             BusyError: too many others wait.
         """
-        if rate > _HIGHEST_RATE:
-            raise InvalidRequestError(f"rate is {rate:g} Hz, allowed is 1 to {_HIGHEST_RATE:g} Hz")
+        require_rate(rate, _HIGHEST_RATE)
         self._waiting = [future for future in self._waiting if not future.done()]
         if len(self._waiting) >= _WAITING_LIMIT:
             raise BusyError(f"busy: {len(self._waiting)} cycles are being made; ask again later")
