@@ -1,32 +1,21 @@
 """A node that asks another one waits for as long as it is worth it, and no longer."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 pytest.importorskip("rclpy")
 
+from nodes.silent_node import FOREVER, Silent
 from std_srvs.srv import Trigger
 
 from walk_optimizer.errors import WalkOptimizerError
-from walk_optimizer.nodes.suite_node import SuiteNode
+from walk_optimizer.nodes.suite_node import ServiceUnavailableError, SuiteNode
 from walk_optimizer.nodes.walk_order import SupersededError
 
 pytestmark = pytest.mark.ros
-
-FOREVER = 3600.0
-
-
-class Silent(SuiteNode):
-    """A node that lives and never answers."""
-
-    def __init__(self):
-        super().__init__("silent", [])
-        self.asked = 0
-        self.serve(Trigger, "~/ask", self._keep_silent)
-        self.announce()
-
-    async def _keep_silent(self, _request, _response):
-        self.asked += 1
-        await self.sleep(FOREVER)
 
 
 @pytest.fixture
@@ -78,3 +67,43 @@ def test_a_call_that_nobody_wants_any_more_does_not_wait_for_a_service_that_may_
     assert not call.task.done()
     call.supersede()
     assert isinstance(graph.result(call.task), SupersededError)
+
+
+class SilentProcess:
+    """The silent node in a process of its own."""
+
+    def __init__(self, log):
+        self._log = log
+        with log.open("w") as output:
+            script = Path(__file__).with_name("silent_node.py")
+            self.process = subprocess.Popen([sys.executable, script], stdout=output)
+
+    def said(self, word):
+        return word in self._log.read_text()
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Starts processes of the silent node, and leaves none behind."""
+    started = []
+
+    def start_one():
+        started.append(SilentProcess(tmp_path / f"{len(started)}.log"))
+        return started[-1]
+
+    yield start_one
+    for one in started:
+        one.process.kill()
+        one.process.wait()
+
+
+def test_a_call_ends_when_its_node_is_killed_also_if_another_is_there_at_once(graph, asking, start):
+    first = start()
+    call = Call(graph, asking, "/silent/ask")
+    graph.spin_until(lambda: first.said("asked") or call.task.done(), "the question")
+    start()
+    graph.spin_until(lambda: asking.count_publishers("/silent/alive") == 2, "the second node")
+    first.process.kill()
+    error = graph.result(call.task)
+    assert isinstance(error, ServiceUnavailableError)
+    assert "went away; ask again" in str(error)

@@ -170,6 +170,17 @@ def test_time_limit_is_enforced_from_outside():
         pool.close()
 
 
+def test_what_outlives_a_killed_worker_is_not_taken_for_it():
+    pool = WorkerPool(work, grace=0.1)
+    progress = FirstProgress()
+    try:
+        assert status_of(pool.submit("survivor", 0.3, progress)) is Status.TIME_LIMIT
+        assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
+    finally:
+        os.kill(progress.wait().iteration, signal.SIGKILL)
+        pool.close()
+
+
 def test_two_clients_share_one_solve(pool):
     progress, other = FirstProgress(), FirstProgress()
     first = pool.submit("sleep", FOREVER, progress)
@@ -234,6 +245,9 @@ def test_close_ends_everything(pool):
     pool.close()
     assert not exists(worker)
     assert status_of(running) is status_of(waiting) is Status.CANCELLED
+    assert {str(one.future.exception()) for one in (running, waiting)} == {
+        "the solver is shutting down; ask again when it runs"
+    }
     assert not any(thread.name.startswith("solve_worker") for thread in threading.enumerate())
     with pytest.raises(BusyError, match="shutting down"):
         pool.submit("echo", FOREVER)

@@ -12,9 +12,16 @@ from walk_optimizer.solve.status import Progress
 def work(job, progress):
     """Do what the first word of the job says."""
     verb, *rest = job.split()
-    return {"echo": echo, "pid": pid, "sleep": sleep, "raise": fail, "die": die, "child": child}[verb](
-        rest, progress
-    )
+    verbs = {
+        "echo": echo,
+        "pid": pid,
+        "sleep": sleep,
+        "raise": fail,
+        "die": die,
+        "child": child,
+        "survivor": survivor,
+    }
+    return verbs[verb](rest, progress)
 
 
 def echo(words, progress):
@@ -46,3 +53,14 @@ def child(words, progress):
     process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
     progress(Progress("child", process.pid, 0.0, 0.0, 0.0))
     process.wait()
+
+
+def survivor(words, progress):
+    """Leave behind a fork that outlives this process with all of its open files, and tell its id."""
+    fork = os.fork()
+    if fork == 0:
+        os.setsid()
+        time.sleep(600)
+        os._exit(0)
+    progress(Progress("survivor", fork, 0.0, 0.0, 0.0))
+    time.sleep(600)

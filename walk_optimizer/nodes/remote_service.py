@@ -33,7 +33,11 @@ def announce_life(node: Node) -> None:
 
 
 class RemoteService:
-    """A client that knows whether it is worth to wait."""
+    """A client that knows whether it is worth to wait.
+
+    Attributes:
+        losses: How often a node that offers the service has gone, also if another was there at once.
+    """
 
     def __init__(self, node: Node, kind: type, name: str, group: CallbackGroup) -> None:
         """Look for a service and for the life of its node.
@@ -45,7 +49,7 @@ class RemoteService:
             group: Callback group of the client.
         """
         self.client: Client = node.create_client(kind, name, qos_profile=SERVICE, callback_group=group)
-        self._lost = False
+        self.losses, self._lost = 0, False
         folder = self.name.rpartition("/")[0]
         node.create_subscription(
             Empty,
@@ -84,4 +88,6 @@ class RemoteService:
 
     def _on_liveliness(self, change: QoSLivelinessChangedInfo) -> None:
         """Note whether anybody lives; a node without the topic is never heard of, and counts as alive."""
+        if change.alive_count_change < 0 or change.not_alive_count_change > 0:
+            self.losses += 1
         self._lost = change.alive_count == 0

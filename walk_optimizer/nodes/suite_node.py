@@ -150,7 +150,7 @@ class SuiteNode(Node):
         if not await self._offered(service, require_wanted):
             raise ServiceUnavailableError(f"service {service.name} is not there; is its node running?")
         future = service.client.call_async(request)
-        begin = self._wall.now()
+        begin, losses = self._wall.now(), service.losses
 
         def watch() -> None:
             try:
@@ -158,7 +158,7 @@ class SuiteNode(Node):
             except WalkOptimizerError as error:
                 future.set_exception(error)
                 return
-            if not service.available:
+            if not service.available or service.losses != losses:
                 future.set_exception(_unavailable(service, "went away"))
             elif (self._wall.now() - begin).nanoseconds * 1e-9 > timeout:
                 future.set_exception(_unavailable(service, f"gave no answer within {timeout:g} s"))

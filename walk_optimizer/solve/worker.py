@@ -19,6 +19,7 @@ from walk_optimizer.solve.worker_task import Task, Ticket
 
 # A solve ends itself at its time limit; one that still has not after this time in [s] is killed.
 GRACE = 2.0
+_SHUTTING_DOWN = "the solver is shutting down; ask again when it runs"
 
 
 class BusyError(WalkOptimizerError):
@@ -84,7 +85,7 @@ class WorkerPool:
         """
         with self._changed:
             if self._closed:
-                raise BusyError("the solver is shutting down; ask again when it runs")
+                raise BusyError(_SHUTTING_DOWN)
             task = self._tasks.get((job, time_limit))
             if task is None:
                 task = self._enqueue(job, time_limit)
@@ -95,6 +96,9 @@ class WorkerPool:
 
     def give_up(self, ticket: Ticket) -> None:
         """End a ticket as cancelled; nothing happens when it has its answer."""
+        self._end(ticket)
+
+    def _end(self, ticket: Ticket, reason: str = "") -> None:
         with self._changed:
             task = next((task for task in self._tasks.values() if ticket in task.tickets), None)
             if task is None:
@@ -102,7 +106,7 @@ class WorkerPool:
             task.tickets.remove(ticket)
             if not task.tickets:
                 self._drop(task)
-        ticket.future.set_exception(task.stopped(Status.CANCELLED))
+        ticket.future.set_exception(task.stopped(Status.CANCELLED, reason))
 
     def state(self) -> PoolState:
         """Return what the pool is doing now."""
@@ -118,7 +122,7 @@ class WorkerPool:
             tickets = [ticket for task in self._tasks.values() for ticket in task.tickets]
             self._changed.notify_all()
         for ticket in tickets:
-            self.give_up(ticket)
+            self._end(ticket, _SHUTTING_DOWN)
         for thread in self._threads:
             thread.join()
         atexit.unregister(self.close)

@@ -50,8 +50,9 @@ class WorkerHandle:
 
     @property
     def alive(self) -> bool:
-        """Whether the process runs; may be asked from any thread."""
-        return not wait([self._process.sentinel], timeout=0)
+        """Whether the process can take a job; may be asked from any thread."""
+        # The sentinel is a pipe, which forks of a killed process may hold open for some more moments.
+        return not self._connection.closed and not wait([self._process.sentinel], timeout=0)
 
     def run(self, job: Any, time_limit: float, on_progress: Callable[[Progress], None]) -> Finished | Failed:
         """Do a job.

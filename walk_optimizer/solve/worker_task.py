@@ -80,11 +80,11 @@ class Task:
         since = 0.0 if self.worker is None else time.monotonic() - self._heard
         return replace(self._progress, elapsed=self._progress.elapsed + since)
 
-    def stopped(self, status: Status) -> SolveStoppedError:
-        """Return the error that ends the task with a status."""
+    def stopped(self, status: Status, message: str = "") -> SolveStoppedError:
+        """Return the error that ends the task with a status; the message is the status's own by default."""
         report = SolveReport(
             status,
-            status.sentence,
+            message or status.sentence,
             back_end="",
             iterations=self._progress.iteration,
             solve_time=time.monotonic() - self.begin,
