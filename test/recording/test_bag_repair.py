@@ -2,15 +2,20 @@
 
 import random
 import shutil
+import tracemalloc
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import lz4.frame
 import pytest
+import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
+from mcap.records import Chunk, Header
 from mcap.writer import Writer
 from recording.samples import JOINTS, PERIOD_NS, START_NS, STORE, joint_state, number_of, write_bag
 from rosbags.highlevel import AnyReader
@@ -26,6 +31,7 @@ from walk_optimizer.recording import (
     repair_bag,
 )
 from walk_optimizer.recording.errors import BagExistsError, NotABagError
+from walk_optimizer.recording.framing import MAGIC
 from walk_optimizer.recording.records import DamageKind
 
 COUNT = 300
@@ -288,6 +294,46 @@ def test_a_file_without_chunks_is_read(tmp_path):
     numbers = [number_of(message.data) for message in read_messages(tmp_path / "cut.mcap")]
     assert 0 < len(numbers) < 10
     assert numbers == list(range(len(numbers)))
+
+
+def file_with_chunk(path: Path, compression: str, data: bytes, size: int) -> Path:
+    """Write a file of one chunk that claims a size in [byte] and has no checksum."""
+    records = RecordBuilder()
+    Header(profile="ros2", library="").write(records)
+    Chunk(compression, data, 0, 0, uncompressed_crc=0, uncompressed_size=size).write(records)
+    path.write_bytes(MAGIC + records.end())
+    return path
+
+
+@pytest.mark.parametrize(
+    ("compression", "compress"),
+    [
+        ("lz4", lambda data: lz4.frame.compress(data, store_size=False)),
+        ("zstd", zstandard.ZstdCompressor(write_content_size=False).compress),
+        ("zstd", zstandard.ZstdCompressor().compress),
+    ],
+)
+def test_a_chunk_takes_no_more_memory_than_it_says(tmp_path, compression, compress):
+    bomb = file_with_chunk(tmp_path / "bomb.mcap", compression, compress(bytes(1 << 26)), size=1000)
+    tracemalloc.start()
+    info = describe_bag(bomb)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert info.files[0].damage[0].kind is DamageKind.CHUNK
+    assert peak < 1 << 23
+
+
+@pytest.mark.parametrize(
+    ("compression", "size", "words"),
+    [
+        ("zstd", 1 << 40, "it claims 1099511627776 bytes, at most 1140850688 are opened"),
+        ("", 5, "it holds 3 bytes, it says 5"),
+        ("brotli", 3, "its compression 'brotli' is none of zstd, lz4"),
+    ],
+)
+def test_a_chunk_that_cannot_be_is_not_opened(tmp_path, compression, size, words):
+    info = describe_bag(file_with_chunk(tmp_path / "walk.mcap", compression, b"abc", size))
+    assert words in info.files[0].damage[0].reason
 
 
 def test_description_for_people(tmp_path):

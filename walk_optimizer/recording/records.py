@@ -2,12 +2,13 @@
 
 import struct
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from io import BytesIO
 from mmap import mmap
 
 import zstandard
+from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
@@ -16,6 +17,9 @@ from mcap.stream_reader import breakup_chunk
 
 RECORD_HEAD = struct.Struct("<BQ")
 """Opcode and length of the body, which stand before every record."""
+
+LARGEST_CHUNK = (1 << 30) + (1 << 26)
+"""Largest content of a chunk that is opened, in [byte]: the most that a recorder can be set to, and a message."""
 
 # What the parsers of the MCAP library and of the compressions let out on bytes that make no sense.
 _PARSE_ERRORS = (
@@ -170,19 +174,43 @@ def _parse_message(body: bytes) -> Message:
 
 def _open_chunk(chunk: Chunk, end: int) -> tuple[McapRecord, ...]:
     try:
-        _check_zstd_size(chunk)
-        return tuple(breakup_chunk(chunk, validate_crc=True))
+        content = replace(chunk, compression="", data=_decompress(chunk))
+        return tuple(breakup_chunk(content, validate_crc=True))
     except _PARSE_ERRORS as error:
         raise UnreadableError(DamageKind.CHUNK, f"a chunk is damaged: {error}", end) from error
 
 
-def _check_zstd_size(chunk: Chunk) -> None:
-    """Refuse a zstd frame that claims another size, before that much memory is taken for it."""
-    if chunk.compression != "zstd":
-        return
-    size = zstandard.frame_content_size(chunk.data)
-    if size not in (-1, chunk.uncompressed_size):
-        raise ValueError(f"its zstd frame claims {size} bytes, the chunk {chunk.uncompressed_size}")
+def _decompress(chunk: Chunk) -> bytes:
+    """Return the content of a chunk, which takes no more memory than the chunk says and than is allowed."""
+    size = chunk.uncompressed_size
+    if size > LARGEST_CHUNK:
+        raise ValueError(f"it claims {size} bytes, at most {LARGEST_CHUNK} are opened")
+    if chunk.compression not in _DECOMPRESSORS:
+        raise ValueError(f"its compression {chunk.compression!r} is none of zstd, lz4")
+    data = _DECOMPRESSORS[chunk.compression](chunk.data, size)
+    if len(data) != size:
+        raise ValueError(f"it holds {len(data)} bytes{' or more' * (len(data) > size)}, it says {size}")
+    return data
+
+
+def _unzstd(data: bytes, size: int) -> bytes:
+    claimed = zstandard.frame_content_size(data)
+    # Without a claim no more than `size` is made; with one, all of it, whatever `size` is.
+    if claimed not in (-1, size):
+        raise ValueError(f"its zstd frame claims {claimed} bytes, the chunk {size}")
+    return zstandard.decompress(data, size)
+
+
+def _unlz4(data: bytes, size: int) -> bytes:
+    content: bytes = LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+    return content
+
+
+_DECOMPRESSORS: Mapping[str, Callable[[bytes, int], bytes]] = {
+    "": lambda data, _: data,
+    "zstd": _unzstd,
+    "lz4": _unlz4,
+}
 
 
 def _count_index(body: bytes) -> int:
