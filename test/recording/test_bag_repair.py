@@ -222,6 +222,16 @@ def test_repair_overwrites_nothing(tmp_path):
     assert repair_bag(bag, tmp_path / "elsewhere").recovered_messages == 11
 
 
+@pytest.mark.parametrize(("folder", "name"), [("walk/notes", ".."), ("walk", "."), (".", "walk/notes/..")])
+def test_a_repaired_bag_lies_beside_its_source_however_that_is_named(tmp_path, monkeypatch, folder, name):
+    bag = write_bag(tmp_path / "walk", range(10))
+    (bag / "notes").mkdir()
+    monkeypatch.chdir(tmp_path / folder)
+    report = repair_bag(Path(name))
+    assert report.destination == tmp_path / "walk_repaired"
+    assert dict(describe_bag(report.destination).custom_data)["repaired_from"] == "walk"
+
+
 def test_a_failed_repair_leaves_nothing(tmp_path, monkeypatch):
     bag = write_bag(tmp_path / "walk", range(10))
     monkeypatch.setattr("walk_optimizer.recording.repair._copy", lambda *_: 1 / 0)

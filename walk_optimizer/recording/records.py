@@ -19,7 +19,7 @@ RECORD_HEAD = struct.Struct("<BQ")
 """Opcode and length of the body, which stand before every record."""
 
 LARGEST_CHUNK = (1 << 30) + (1 << 26)
-"""Largest content of a chunk that is opened, in [byte]: the most that a recorder can be set to, and a message."""
+"""Largest content of a chunk that is opened, in [byte]: the most a recorder can be set to, and a message."""
 
 # What the parsers of the MCAP library and of the compressions let out on bytes that make no sense.
 _PARSE_ERRORS = (

@@ -66,8 +66,10 @@ def repair_bag(path: Path, destination: Path | None = None) -> RepairReport:
         RecordingError: If the destination cannot be written; nothing is left of it then.
     """
     info = describe_bag(path)
-    target = destination or _beside(path.absolute())
-    custom_data = {**dict(info.custom_data), REPAIRED_FROM_KEY: path.name}
+    # Without `..`, whose neighbours are inside of the folder that it leads out of.
+    source = path.resolve()
+    target = destination or _beside(source)
+    custom_data = {**dict(info.custom_data), REPAIRED_FROM_KEY: source.name}
     writer = BagWriter(target, _settings(info), custom_data, info.topics)
     try:
         _copy(info, writer)
