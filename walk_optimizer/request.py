@@ -173,7 +173,7 @@ def _checked_speed(speed: float, settings: GaitTableSettings) -> float:
     low, high = settings.minimum_speed, settings.maximum_speed
     if not (math.isfinite(speed) and low <= speed <= high):
         raise InvalidRequestError(
-            f"speed is {speed:.12g} m/s, allowed is {low:g} to {high:g} m/s "
+            f"speed is {speed:.8g} m/s, allowed is {low:g} to {high:g} m/s "
             f"({low * KMH_PER_MS:.2f} to {high * KMH_PER_MS:.2f} km/h)"
         )
     return float(speed)

@@ -76,7 +76,7 @@ def test_impossible_steps(value):
 
 
 def test_a_step_of_impossible_speed():
-    assert refusal(GaitRequest.for_step, 3.0, 0.7).startswith("speed is 4.28571 m/s, allowed is 0.15")
+    assert refusal(GaitRequest.for_step, 3.0, 0.7).startswith("speed is 4.2857143 m/s, allowed is 0.15")
 
 
 def test_what_is_allowed_is_accepted():
