@@ -1,5 +1,7 @@
 """`walk-optimizer bag play`: a process of its own plays a bag to a subscriber."""
 
+import math
+import signal
 import subprocess
 import sys
 import time
@@ -14,9 +16,10 @@ from recording.samples import GAIT, JOINTS, PERIOD_NS, START_NS, number_of, stri
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from walk_optimizer.nodes.bag_player import qos_of
+from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.nodes.bag_player import play_bag, qos_of
 from walk_optimizer.nodes.qos import LATCHED, STREAM
-from walk_optimizer.recording import BagWriter, QosProfile, RecorderSettings
+from walk_optimizer.recording import BagWriter, QosProfile, RecorderSettings, describe_bag
 from walk_optimizer.recording.ros_messages import qos_profile
 
 pytestmark = pytest.mark.ros
@@ -67,6 +70,32 @@ def test_a_bag_is_played_as_it_was_recorded_and_never_faster(graph, bag):
     # The last one was due at the end of the recording's time, however long a message takes.
     assert times[-1] - times[0] > (COUNT - 1) * PERIOD_NS * 1e-9 / RATE - 0.1
     assert np.median(np.diff(times)) > 0.5 * PERIOD_NS * 1e-9 / RATE
+
+
+def test_a_gap_of_decades_is_told_and_can_be_broken_off(graph, tmp_path):
+    with BagWriter(tmp_path / "bag", RecorderSettings(min_free_bytes=0), topics=[GAIT]) as writer:
+        for time_ns in (0, START_NS):
+            writer.write(GAIT.name, string("a gait"), time_ns)
+    player = play(tmp_path / "bag", "--rate", "0.01")
+    line = player.stdout.readline()
+    assert "waiting 170000000000 s (1967593 days) for the next message; Ctrl-C ends it" in line
+    assert player.poll() is None
+    player.send_signal(signal.SIGINT)
+    assert (player.wait(60), "interrupted" in player.communicate()[0]) == (130, True)
+
+
+def test_what_cannot_be_played_is_refused_before_any_work(bag, monkeypatch):
+    monkeypatch.setattr("walk_optimizer.nodes.bag_player._player", lambda: pytest.fail("it took part"))
+    info = describe_bag(bag)
+    for arguments in (
+        {"rate": 0.0},
+        {"rate": math.nan},
+        {"delay": -1.0},
+        {"topics": ["/nothing"]},
+        {"remaps": [f"{JOINTS.name}:={GAIT.name}"]},
+    ):
+        with pytest.raises(InvalidRequestError):
+            play_bag(bag, info, **{"delay": 0.0, "tell": print} | arguments)
 
 
 def test_topics_are_picked_and_wrong_ones_refused(graph, bag):

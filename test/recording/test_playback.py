@@ -5,11 +5,11 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recording.samples import JOINTS, PERIOD_NS, write_bag
+from recording.samples import GAIT, JOINTS, PERIOD_NS, topic, write_bag
 
 from walk_optimizer.errors import InvalidRequestError
-from walk_optimizer.recording import describe_bag
-from walk_optimizer.recording.playback import Schedule, messages_due, require_topics
+from walk_optimizer.recording import BagWriter, describe_bag
+from walk_optimizer.recording.playback import Schedule, gap_warning, messages_due, require_topics, topic_names
 
 
 class Clock:
@@ -58,6 +58,51 @@ def test_a_player_that_keeps_up_plays_as_recorded():
 def test_an_impossible_rate_is_refused(rate):
     with pytest.raises(InvalidRequestError, match=r"rate is .*, allowed is 0.01 to 100"):
         Schedule(rate)
+
+
+def test_an_impossible_rate_is_refused_before_the_first_message_is_asked_for(tmp_path):
+    with pytest.raises(InvalidRequestError, match="rate is nan"):
+        messages_due(tmp_path / "nothing", None, float("nan"), loop=False)
+
+
+@pytest.mark.parametrize("topics", [None, ["/silent"]])
+def test_nothing_to_play_is_refused(tmp_path, topics):
+    info = describe_bag(write_bag(tmp_path / "walk", range(3)))
+    with BagWriter(tmp_path / "silent", topics=[topic("/silent", "std_msgs/msg/String")]):
+        pass
+    silent = describe_bag(tmp_path / "silent")
+    with pytest.raises(
+        InvalidRequestError, match="nothing to play: no message on /silent is left in the bag"
+    ):
+        topic_names(silent, topics)
+    assert len(topic_names(info, None)) == 2
+    (tmp_path / "empty.mcap").touch()
+    with pytest.raises(InvalidRequestError, match="nothing to play: the bag has no topic"):
+        topic_names(describe_bag(tmp_path / "empty.mcap"), None)
+
+
+@pytest.mark.parametrize("other", [GAIT.name, GAIT.name.lstrip("/")])
+def test_two_topics_are_not_played_under_one_name(tmp_path, other):
+    info = describe_bag(write_bag(tmp_path / "walk", range(3)))
+    with pytest.raises(
+        InvalidRequestError, match=f"{JOINTS.name} and {GAIT.name} would both be played on {GAIT.name}"
+    ):
+        topic_names(info, None, [f"{JOINTS.name}:={other}"])
+    assert topic_names(info, [JOINTS.name], [f"{JOINTS.name}:={other}"]) == {JOINTS.name: other}
+    swapped = [f"{JOINTS.name}:={GAIT.name}", f"{GAIT.name}:={JOINTS.name}"]
+    assert topic_names(info, None, swapped) == {JOINTS.name: GAIT.name, GAIT.name: JOINTS.name}
+
+
+@pytest.mark.parametrize(
+    ("wait", "words"),
+    [
+        (9.9, None),
+        (10.0, "nothing was recorded for a while: waiting 10 s for the next message"),
+        (1_700_000_008.0, "waiting 1700000008 s (19676 days) for the next message"),
+    ],
+)
+def test_a_long_gap_is_told_before_it_is_waited_for(wait, words):
+    assert (gap_warning(wait) is None) if words is None else (words in gap_warning(wait))
 
 
 def test_a_loop_begins_anew_and_topics_can_be_picked(tmp_path):

@@ -96,11 +96,15 @@ def run_play(args: argparse.Namespace) -> int:
 
     info = describe_bag(args.bag)
     if not info.is_whole:
-        print(f"{args.bag} is damaged: what can be trusted is played; `bag info` tells more", file=sys.stderr)
+        _tell(f"{args.bag} is damaged: what can be trusted is played; `bag info` tells more")
     try:
         from walk_optimizer.nodes.bag_player import play_bag
     except ImportError as error:
         raise MissingDependencyError(f"playing a bag needs ROS 2: {error}") from error
-    played = play_bag(args.bag, info, args.delay, args.topics, args.rate, args.loop, args.remap)
+    played = play_bag(args.bag, info, args.delay, _tell, args.topics, args.rate, args.loop, args.remap)
     print(f"played {played.messages} messages on {played.topics} topics")
     return 0
+
+
+def _tell(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

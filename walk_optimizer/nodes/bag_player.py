@@ -1,10 +1,11 @@
 """Plays bags through rclpy: the very bytes, on their topics, with the quality of service of the recording."""
 
 import time
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import TIMEOUT_MAX
 
 import rclpy
 from rclpy.duration import Duration
@@ -22,7 +23,7 @@ from rclpy.signals import SignalHandlerOptions
 from walk_optimizer.errors import InvalidRequestError, WalkOptimizerError
 from walk_optimizer.nodes.parameters import require_name
 from walk_optimizer.recording.info import BagInfo
-from walk_optimizer.recording.playback import messages_due, topic_names
+from walk_optimizer.recording.playback import gap_warning, messages_due, topic_names
 from walk_optimizer.recording.ros_messages import message_class
 from walk_optimizer.recording.topics import INFINITE_NS, QosProfile, TopicInfo
 
@@ -58,6 +59,7 @@ def play_bag(
     path: Path,
     info: BagInfo,
     delay: float,
+    tell: Callable[[str], None],
     topics: Collection[str] | None = None,
     rate: float = 1.0,
     loop: bool = False,
@@ -70,6 +72,7 @@ def play_bag(
         info: What is in it.
         delay: Time for subscribers to find the player, in [s]; the player looks around for 4 s at the
             least.
+        tell: Is given what the user should know meanwhile, a line each.
         topics: Names of the topics wanted; all when None.
         rate: Time of the recording for each time of playing.
         loop: Whether to begin anew at the end.
@@ -97,13 +100,21 @@ def play_bag(
         time.sleep(max(delay, _DISCOVERY))
         _require_alone(node, publishers.values(), asked_for=topics or ())
         for message, wait in messages:
-            time.sleep(wait)
+            _wait(wait, tell)
             publishers[message.topic.name].publish(message.data)
             count += 1
         # What is reliable may still be under way.
         for publisher in publishers.values():
             publisher.wait_for_all_acked(Duration(seconds=_LAST_WORDS))
     return Playing(count, len(publishers))
+
+
+def _wait(wait: float, tell: Callable[[str], None]) -> None:
+    """Wait for the next message, in [s]; a long wait is told first."""
+    warning = gap_warning(wait)
+    if warning is not None:
+        tell(warning)
+    time.sleep(min(wait, TIMEOUT_MAX))
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from walk_optimizer.errors import InvalidRequestError, quoted
@@ -13,6 +13,9 @@ NANOSECONDS = 1e9
 _SLOWEST, _FASTEST = 0.01, 100.0
 # A player that is later than this moves its schedule instead of catching up, in [s].
 _LONGEST_DELAY = 0.02
+# From here on a wait looks like a player that hangs, in [s].
+_LONG_WAIT = 10.0
+_DAY = 86_400.0
 
 
 class Schedule:
@@ -74,10 +77,12 @@ def topic_names(
         remaps: Other names for some of them, each as FROM:=TO.
 
     Raises:
-        InvalidRequestError: the bag lacks a topic, or a remap is none.
+        InvalidRequestError: the bag lacks a topic, has no message to play, a remap is none, or two topics
+            would get one name.
     """
     require_topics(info, topics or ())
     wanted = [topic.name for topic in info.topics if topics is None or topic.name in topics]
+    _require_messages(info, wanted)
     names = {name: name for name in wanted}
     for remap in remaps:
         name, mark, other = remap.partition(":=")
@@ -88,7 +93,51 @@ def topic_names(
         if name not in names:
             raise InvalidRequestError(f"{quoted(name)} is not played; played are {', '.join(wanted)}")
         names[name] = other
+    _require_apart(names)
     return names
+
+
+def _require_messages(info: BagInfo, wanted: Sequence[str]) -> None:
+    """Refuse topics without a message.
+
+    Raises:
+        InvalidRequestError: says what there is not.
+    """
+    counts = info.counts
+    if not any(counts[name] for name in wanted):
+        lacking = (
+            f"no message on {', '.join(wanted)} is left in the bag" if wanted else "the bag has no topic"
+        )
+        raise InvalidRequestError(f"nothing to play: {lacking}; `walk-optimizer bag info` tells more")
+
+
+def _require_apart(names: Mapping[str, str]) -> None:
+    """Refuse to play two topics as one: their subscribers could not tell them apart.
+
+    Raises:
+        InvalidRequestError: names both, and what to do.
+    """
+    played: dict[str, str] = {}
+    for name, given in names.items():
+        # The player is in no namespace.
+        other = given if given[0] in "/~" else f"/{given}"
+        if other in played:
+            raise InvalidRequestError(
+                f"{played[other]} and {name} would both be played on {other}; "
+                "give one of them another name with --remap, or leave it out with --topics"
+            )
+        played[other] = name
+
+
+def gap_warning(wait: float) -> str | None:
+    """Return what to tell before a message is waited for, in [s]; None for waits that nobody minds."""
+    if wait < _LONG_WAIT:
+        return None
+    days = f" ({wait / _DAY:.0f} days)" if wait >= _DAY else ""
+    return (
+        f"nothing was recorded for a while: waiting {wait:.0f} s{days} for the next message; "
+        "Ctrl-C ends it, --rate plays faster"
+    )
 
 
 def messages_due(
@@ -102,9 +151,19 @@ def messages_due(
         rate: Time of the recording for each time of playing.
         loop: Whether to begin anew at the end, without end.
 
-    Yields:
+    Returns:
         The messages; the wait is counted from when one is asked for.
+
+    Raises:
+        InvalidRequestError: the rate is out of range.
     """
+    Schedule(rate)
+    return _messages_due(path, topics, rate, loop)
+
+
+def _messages_due(
+    path: Path, topics: Collection[str] | None, rate: float, loop: bool
+) -> Iterator[tuple[BagMessage, float]]:
     while True:
         schedule, played = Schedule(rate), 0
         for message in read_messages(path, topics):
