@@ -142,6 +142,42 @@ def test_diagnostics_beside_those_of_others_are_played_if_asked_for(graph, tmp_p
     assert outcomes == [2, 0]
 
 
+@pytest.mark.parametrize(
+    ("variable", "value"), [("ROS_DOMAIN_ID", "abc"), ("ROS_SECURITY_KEYSTORE", "/nowhere")]
+)
+def test_an_environment_that_ros_refuses_gives_one_line(graph, bag, monkeypatch, variable, value):
+    monkeypatch.setenv("ROS_SECURITY_ENABLE", "true" if "SECURITY" in variable else "false")
+    monkeypatch.setenv("ROS_SECURITY_STRATEGY", "Enforce")
+    monkeypatch.setenv(variable, value)
+    player = play(bag)
+    assert player.wait(60) == 2
+    output = player.communicate()[0]
+    assert "walk-optimizer: can't start: " in output
+    assert "see ROS_DOMAIN_ID and the variables ROS_SECURITY_*" in output
+    assert "Traceback" not in output
+
+
+@pytest.mark.parametrize(
+    ("told", "offered"),
+    [
+        ({"reliability": "unknown"}, {}),
+        ({"reliability": "sometimes", "durability": "unknown"}, {}),
+        (
+            {"liveliness": "manual_by_node", "durability": "transient_local"},
+            {"durability": "transient_local"},
+        ),
+        ({"liveliness": "unknown", "reliability": "best_effort"}, {"reliability": "best_effort"}),
+        ({"depth": -5}, {}),
+        ({"depth": 10**12, "deadline_ns": -5}, {}),
+        ({"depth": 100_000}, {"depth": 100_000}),
+    ],
+)
+def test_what_ros_cannot_offer_becomes_the_default(graph, told, offered):
+    recorded = topic("/told", "std_msgs/msg/String", QosProfile(**told))
+    assert qos_profile(qos_of(recorded)) == QosProfile(**offered)
+    graph.node.destroy_publisher(graph.node.create_publisher(String, "/told", qos_of(recorded)))
+
+
 def test_the_recorded_quality_of_service_is_offered_again():
     for qos in (STREAM, LATCHED):
         recorded = topic("/t", "std_msgs/msg/String", qos_profile(qos))

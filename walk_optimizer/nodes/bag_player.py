@@ -6,6 +6,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import TIMEOUT_MAX
+from typing import TypeVar
 
 import rclpy
 from rclpy.duration import Duration
@@ -34,8 +35,14 @@ _LONGEST_DELAY = 3600.0
 _DISCOVERY, _NAME_DELAY = 4.0, 1.0
 # Topics that every node has, and those that several nodes may share, where somebody asks for that.
 _EVERYBODYS, _SHARED = ("/rosout", "/parameter_events"), ("diagnostics", "tf", "tf_static")
-# What a topic is given whose recording does not tell its history.
-_DEPTH = 10
+# What a topic is given whose recording does not tell its history, and the most that a topic is given.
+_DEPTH, _LARGEST_DEPTH = 10, 100_000
+
+_Policy = TypeVar("_Policy", ReliabilityPolicy, DurabilityPolicy, LivelinessPolicy)
+
+
+class PlayerError(WalkOptimizerError):
+    """ROS refuses the player: its environment, its keys, or a topic of the bag."""
 
 
 class TopicInUseError(WalkOptimizerError):
@@ -83,6 +90,7 @@ def play_bag(
         TopicInUseError: somebody else publishes one of the topics.
         ConfigurationError: another name is no name of a topic.
         MessageDefinitionError: a message type is not installed.
+        PlayerError: ROS does not let it publish.
     """
     names = topic_names(info, topics, remaps)
     for name in names.values():
@@ -119,9 +127,18 @@ def _wait(wait: float, tell: Callable[[str], None]) -> None:
 
 @contextmanager
 def _player() -> Iterator[Node]:
-    """Take part in the ROS graph; Ctrl-C stays Python's."""
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    node = Node("walk_optimizer_bag_player", start_parameter_services=False)
+    """Take part in the ROS graph; Ctrl-C stays Python's.
+
+    Raises:
+        PlayerError: ROS does not let it.
+    """
+    try:
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        node = Node("walk_optimizer_bag_player", start_parameter_services=False)
+    except RuntimeError as error:
+        rclpy.try_shutdown()
+        advice = "see ROS_DOMAIN_ID and the variables ROS_SECURITY_*"
+        raise PlayerError(f"can't start: {error}; {advice}") from error
     try:
         yield node
     finally:
@@ -130,7 +147,11 @@ def _player() -> Iterator[Node]:
 
 
 def _publisher(node: Node, topic: TopicInfo, name: str) -> Publisher:
-    return node.create_publisher(message_class(topic.type_name), name, qos_of(topic))
+    try:
+        return node.create_publisher(message_class(topic.type_name), name, qos_of(topic))
+    except RuntimeError as error:
+        advice = "play other topics with --topics, or this one under another name with --remap"
+        raise PlayerError(f"{name} can't be published as {topic.type_name}: {error}; {advice}") from error
 
 
 def _require_alone(node: Node, publishers: Iterable[Publisher], asked_for: Collection[str]) -> None:
@@ -166,21 +187,27 @@ def _others(node: Node, topic: str) -> list[str]:
 
 
 def qos_of(topic: TopicInfo) -> QoSProfile:
-    """Return what the publisher of a recorded topic offered."""
+    """Return what the publisher of a recorded topic offered, as far as that is told and can be offered."""
     recorded = topic.qos[0] if topic.qos else QosProfile()
     keeps_all = recorded.history == "keep_all"
     return QoSProfile(
         history=HistoryPolicy.KEEP_ALL if keeps_all else HistoryPolicy.KEEP_LAST,
-        depth=recorded.depth or _DEPTH,
-        reliability=ReliabilityPolicy[recorded.reliability.upper()],
-        durability=DurabilityPolicy[recorded.durability.upper()],
-        liveliness=LivelinessPolicy[recorded.liveliness.upper()],
+        depth=recorded.depth if 0 < recorded.depth <= _LARGEST_DEPTH else _DEPTH,
+        reliability=_policy(ReliabilityPolicy.RELIABLE, recorded.reliability),
+        durability=_policy(DurabilityPolicy.VOLATILE, recorded.durability),
+        liveliness=_policy(LivelinessPolicy.AUTOMATIC, recorded.liveliness),
         deadline=_duration(recorded.deadline_ns),
         lifespan=_duration(recorded.lifespan_ns),
         liveliness_lease_duration=_duration(recorded.liveliness_lease_duration_ns),
     )
 
 
+def _policy(default: _Policy, word: str) -> _Policy:
+    """Return a recorded policy; the default for words that say nothing, or nothing that rclpy has."""
+    found = type(default).__members__.get(word.upper(), default)
+    return default if found.name == "UNKNOWN" else found
+
+
 def _duration(nanoseconds: int) -> Duration:
-    """Return a duration; 0, which the middleware takes for infinite, for an infinite one."""
-    return Duration(nanoseconds=0 if nanoseconds >= INFINITE_NS else nanoseconds)
+    """Return a duration; 0, which the middleware takes for infinite, for what is none or infinite."""
+    return Duration(nanoseconds=nanoseconds if 0 < nanoseconds < INFINITE_NS else 0)

@@ -120,7 +120,7 @@ def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
     """
     try:
         return tuple(QosProfile.from_mapping(profile) for profile in yaml.safe_load(text) or ())
-    except (yaml.YAMLError, KeyError, IndexError, TypeError, ValueError):
+    except (yaml.YAMLError, LookupError, TypeError, ValueError, OverflowError, RecursionError):
         return ()
 
 
