@@ -39,6 +39,7 @@ __all__ = [
     "Selection",
     "Source",
     "cache_folder",
+    "existing_folder",
     "parse_selection",
     "table_folder",
 ]
@@ -47,6 +48,20 @@ __all__ = [
 def table_folder() -> Path:
     """Return the folder of the packaged table, which is only read."""
     return data_folder() / "gaits"
+
+
+def existing_folder(folder: Path | str) -> Path:
+    """Return a folder that was named; a misspelt one must not pass for one that holds nothing.
+
+    Raises:
+        GaitFileError: it is missing, or no folder.
+    """
+    folder = Path(folder)
+    if folder.is_dir():
+        return folder
+    if folder.exists():
+        raise GaitFileError(f"{folder}: the folder is a file; name another")
+    raise GaitFileError(f"{folder}: the folder is missing; create it or name another")
 
 
 def cache_folder(walker: WalkerParameters) -> Path:
@@ -64,7 +79,9 @@ class GaitLibrary:
     is served.
     """
 
-    def __init__(self, walker: WalkerParameters, folder: Path | None = None, writable: bool = False) -> None:
+    def __init__(
+        self, walker: WalkerParameters, folder: Path | str | None = None, writable: bool = False
+    ) -> None:
         """Load what there is.
 
         Args:
@@ -74,10 +91,11 @@ class GaitLibrary:
             writable: Whether to make sure now that gaits can be stored.
 
         Raises:
-            GaitFileError: `writable`, and the folder is missing, a symbolic link or not writable.
+            GaitFileError: a folder that is named is missing, or none; or `writable`, and the folder is a
+                symbolic link or not writable.
         """
         self.walker = walker
-        self.folder = folder if folder is not None else cache_folder(walker)
+        self.folder = cache_folder(walker) if folder is None else existing_folder(folder)
         self._create = folder is None
         if writable:
             writable_folder(self.folder, self._create)

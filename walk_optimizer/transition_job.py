@@ -60,10 +60,10 @@ def transition_job(job: TransitionJob, progress: ProgressCallback) -> Transition
 
 def planned(job: TransitionJob, progress: ProgressCallback | None = None) -> TransitionAnswer:
     """Return solved steps of the table, or solve and keep them."""
-    table = TransitionTable(job.source.walker, job.folder)
+    table, missing = _table(job)
     known = table.find(job.source, job.target, job.torque_limit)
     if known is not None:
-        return TransitionAnswer(known.steps, "from the table")
+        return TransitionAnswer(known.steps, "from the table", missing)
     outcome = plan_transition(
         job.source.walker,
         job.source,
@@ -72,14 +72,25 @@ def planned(job: TransitionJob, progress: ProgressCallback | None = None) -> Tra
         time_limit=job.time_limit,
         progress=progress,
     )
-    problems = table.problems()
+    problems = [*filter(None, [missing]), *table.problems()]
     if outcome.transition is None:
         return TransitionAnswer((), outcome.report.message, "; ".join(problems))
     # A file is named by its paces alone, so only steps that are an optimum without the limit too are kept.
     hip, knee = hip_and_knee(job.torque_limit)
-    if not exceeds(outcome.transition.steps, (_FREE * hip, _FREE * knee)):
+    if not missing and not exceeds(outcome.transition.steps, (_FREE * hip, _FREE * knee)):
         try:
             table.store(outcome.transition)
         except GaitFileError as error:
             problems.append(str(error))
     return TransitionAnswer(outcome.transition.steps, outcome.report.message, "; ".join(problems))
+
+
+def _table(job: TransitionJob) -> tuple[TransitionTable, str]:
+    """Return the table of a job, and why it lacks the job's folder; empty if it does not.
+
+    A folder that is removed while something walks must not end that: what ships still serves.
+    """
+    try:
+        return TransitionTable(job.source.walker, job.folder), ""
+    except GaitFileError as error:
+        return TransitionTable(job.source.walker), str(error)

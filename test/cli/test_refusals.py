@@ -16,8 +16,8 @@ BAD = [
     (["--speed", "-inf"], f"speed is -inf m/s, {LIMITS}"),
     (["--speed", "0"], f"speed is 0 m/s, {LIMITS}"),
     (["--speed", "-0.3"], f"speed is -0.3 m/s, {LIMITS}"),
-    (["--speed", "-1.15km/h"], f"speed is -0.319444 m/s, {LIMITS}"),
-    (["--speed", "40km/h"], f"speed is 11.1111 m/s, {LIMITS}"),
+    (["--speed", "-1.15km/h"], f"speed is -0.31944444 m/s, {LIMITS}"),
+    (["--speed", "40km/h"], f"speed is 11.111111 m/s, {LIMITS}"),
     (["--speed", "fast"], "speed 'fast' not understood; write 0.3185, 0.3185m/s or 1.15km/h"),
     (["--speed", "0.7mph"], "speed '0.7mph' not understood"),
     (["--speed", ""], "speed '' not understood"),
@@ -80,6 +80,18 @@ def test_bad_input_of_solve_is_refused_in_one_line(no_work, capsys, arguments, m
             ["picture", "--file", "gait.npz", "--speed", "0.3", "--spring", "none", "--output", "gait.png"],
             "--file can't be combined with --speed, --spring; leave out the one or the other",
         ),
+        *[
+            ([*command, "/nowhere"], "/nowhere: the folder is missing; create it or name another")
+            for command in (
+                ["table", "--library"],
+                ["library", "list", "--library"],
+                ["solve", "--speed", "0.3", "--library"],
+                ["export", "--speed", "0.3", "--library"],
+                ["simulate", "--table", "--library"],
+                ["transitions", "list", "--folder"],
+                ["transitions", "verify", "--folder"],
+            )
+        ],
         (["library", "verify", "--folder", "/nowhere"], "/nowhere: no gait files"),
         (["library", "build", "--output", "/nowhere"], "/nowhere: the folder is missing"),
         (["library", "build", "--jobs", "0"], "jobs is '0', allowed are whole numbers of at least 1"),
@@ -106,7 +118,7 @@ def test_the_script_refuses_without_a_traceback_and_at_once(tmp_path):
     done = walk_optimizer("solve", "--speed", "-1km/h", home=tmp_path)
     assert time.monotonic() - begin < 5
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == f"walk-optimizer: speed is -0.277778 m/s, {LIMITS}\n"
+    assert done.stderr == f"walk-optimizer: speed is -0.27777778 m/s, {LIMITS}\n"
     assert list(tmp_path.rglob("*.npz")) == []
 
 

@@ -216,7 +216,7 @@ def test_a_folder_that_cannot_be_written_stops_the_start(start, tmp_path):
     link, file = tmp_path / "link", tmp_path / "file"
     link.symlink_to(tmp_path)
     file.touch()
-    places = {link: "is a symbolic link", file: "is missing", "/proc/1": "is not writable"}
+    places = {link: "is a symbolic link", file: "is a file", "/proc/1": "is not writable"}
     started = {place: start("gait_library", cache_folder=place) for place in places}
     for place, node in started.items():
         assert node.process.wait(60) == 1

@@ -19,6 +19,7 @@ from walk_optimizer.errors import GaitFileError, GaitNotFoundError, GaitNotWrita
 from walk_optimizer.gait_files import gait_file_name, write_gait_file
 from walk_optimizer.library import GaitLibrary, Source, cache_folder
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
+from walk_optimizer.transition.table import TransitionTable
 
 WALKER = WalkerParameters()
 SLOW, FAST = 0.20 / 0.85, 0.25 / 0.785
@@ -245,13 +246,32 @@ def test_an_unusable_folder_is_named_when_writing_is_wanted(table, tmp_path):
     for place, message in (
         (missing, "the folder is missing"),
         (link, "is a symbolic link"),
-        (file, "the folder is missing"),
+        (file, "the folder is a file; name another"),
         (file / "below", "the folder is missing|not writable"),
         (Path("/proc/1"), "the folder is not writable"),
     ):
         with pytest.raises(GaitFileError, match=message) as error:
             GaitLibrary(WALKER, place, writable=True)
         assert str(error.value).startswith(f"{place}:")
+
+
+def test_a_folder_that_is_named_has_to_exist_for_reading_too(table, tmp_path):
+    (tmp_path / "file").touch()
+    for place, message in (
+        (tmp_path / "missing", "the folder is missing; create it or name another"),
+        (tmp_path / "file", "the folder is a file; name another"),
+    ):
+        for kind in (GaitLibrary, TransitionTable):
+            with pytest.raises(GaitFileError) as error:
+                kind(WALKER, place)
+            assert str(error.value) == f"{place}: {message}"
+
+
+def test_a_cache_that_is_not_there_yet_is_no_fault(table, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "missing"))
+    assert GaitLibrary(WALKER).gaits() == []
+    assert TransitionTable(WALKER).names()
+    assert not (tmp_path / "missing").exists()
 
 
 def test_a_cache_below_a_file_is_refused(table, tmp_path, monkeypatch):

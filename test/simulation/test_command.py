@@ -73,3 +73,12 @@ def test_a_table_takes_a_library_and_friction(tmp_path, capsys, monkeypatch):
     ((_, _, friction),) = asked
     assert friction == 0.7
     assert capsys.readouterr().out.startswith("| km/h | springs |")
+
+
+def test_a_walker_whose_table_is_not_solved_is_refused(tmp_path, capsys):
+    walker = tmp_path / "walker.yaml"
+    walker.write_text("hip_mass: 50.0\n")
+    assert main(["simulate", "--table", "--walker", str(walker), "--library", str(tmp_path)]) == 2
+    printed = capsys.readouterr()
+    assert printed.err.startswith(f"walk-optimizer: {tmp_path}: no gaits of the table for this walker; ")
+    assert (printed.out, len(printed.err.splitlines())) == ("", 1)

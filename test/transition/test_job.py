@@ -21,6 +21,13 @@ def plan(gaits, walker, tmp_path):
     return plan
 
 
+def test_a_walk_goes_on_with_what_ships_when_its_folder_has_gone(gaits, stand, tmp_path):
+    gone = tmp_path / "gone"
+    answer = planned(TransitionJob(stand, gaits[SpringMode.NONE][0], 50.0, 60.0, gone))
+    assert answer.steps
+    assert answer.problem == f"{gone}: the folder is missing; create it or name another"
+
+
 def test_solved_steps_are_kept_unless_a_limit_holds_them_back(plan):
     assert plan(12.0) is None  # Without a limit they need 13.3 N m.
     kept = plan(50.0)

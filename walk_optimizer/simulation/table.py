@@ -1,7 +1,9 @@
 """What feedback makes of each gait, as rows of a table."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
+from walk_optimizer.errors import GaitNotFoundError
+from walk_optimizer.gait import Gait
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.request import KMH_PER_MS, gait_table_settings
 from walk_optimizer.simulation.closed_loop import ClosedLoop, closed_loop
@@ -25,25 +27,41 @@ HEADINGS = (
 )
 
 
+def table_gaits(library: GaitLibrary) -> list[Gait]:
+    """Return the gaits of the table's speeds, on its grid.
+
+    Raises:
+        GaitNotFoundError: there are none.
+    """
+    points = gait_table_settings().points
+    speeds = gait_table_settings().table_speeds()
+    found = [
+        gait
+        for gait in library.gaits()
+        if gait.request.points == points and any(abs(gait.request.speed - speed) < 1e-9 for speed in speeds)
+    ]
+    if not found:
+        raise GaitNotFoundError(
+            f"{library.folder}: no gaits of the table for this walker; solve them with `library build`"
+        )
+    return found
+
+
 def table_rows(
-    library: GaitLibrary, settings: SimulationSettings, friction: float | None = None
+    gaits: Iterable[Gait], settings: SimulationSettings, friction: float | None = None
 ) -> Iterator[tuple[str, ...]]:
     """Return a row for each gait of the table, one after the other: each takes a minute.
 
     Args:
-        library: The gaits.
+        gaits: Those of the table.
         settings: Of the walks.
         friction: Coefficient of the ground [-]; that of the gaits' walker by default.
     """
-    points = gait_table_settings().points
-    speeds = gait_table_settings().table_speeds()
-    for gait in library.gaits():
-        of_table = any(abs(gait.request.speed - speed) < 1e-9 for speed in speeds)
-        if of_table and gait.request.points == points:
-            loop = closed_loop(gait, settings)
-            loop = loop if friction is None else loop.on_ground(friction)
-            names = (f"{gait.speed * KMH_PER_MS:.2f}", gait.request.spring_mode.value)
-            yield *names, *orbit_cells(loop), *robustness_cells(robustness(loop, settings.steps))
+    for gait in gaits:
+        loop = closed_loop(gait, settings)
+        loop = loop if friction is None else loop.on_ground(friction)
+        names = (f"{gait.speed * KMH_PER_MS:.2f}", gait.request.spring_mode.value)
+        yield *names, *orbit_cells(loop), *robustness_cells(robustness(loop, settings.steps))
 
 
 def orbit_cells(loop: ClosedLoop) -> tuple[str, str, str]:

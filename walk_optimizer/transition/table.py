@@ -11,6 +11,7 @@ from walk_optimizer.errors import GaitFileError, GaitNotFoundError
 from walk_optimizer.gait_files import SUFFIX
 from walk_optimizer.gait_files.access import writable_folder
 from walk_optimizer.library import cache_folder as gait_cache_folder
+from walk_optimizer.library import existing_folder
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.resources import data_folder
 from walk_optimizer.transition.files import TransitionName, read_transition_file, write_transition_file
@@ -45,16 +46,19 @@ class TransitionTable:
     missing.
     """
 
-    def __init__(self, walker: WalkerParameters, folder: Path | None = None) -> None:
+    def __init__(self, walker: WalkerParameters, folder: Path | str | None = None) -> None:
         """Look at which files there are.
 
         Args:
             walker: The walker of all transitions.
             folder: Folder of this walker's stored transitions; None means the user's cache, which is
                 created when something is written. A folder that is named has to exist.
+
+        Raises:
+            GaitFileError: a folder that is named is missing, or none.
         """
         self.walker = walker
-        self.folder = folder if folder is not None else cache_folder(walker)
+        self.folder = cache_folder(walker) if folder is None else existing_folder(folder)
         self._create = folder is None
         # The user's own come first; one that no longer fits its gaits leaves the packaged one to serve.
         self._files: dict[TransitionName, tuple[Path, ...]] = {}
