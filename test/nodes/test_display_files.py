@@ -23,7 +23,8 @@ from walk_optimizer.resources import config_file
 pytestmark = pytest.mark.ros
 
 CHECKOUT = config_file("walker.yaml").resolve().parents[1]
-RVIZ = yaml.safe_load((CHECKOUT / "rviz" / "walker.rviz").read_text())["Visualization Manager"]
+RVIZ_FILE = yaml.safe_load((CHECKOUT / "rviz" / "walker.rviz").read_text())
+RVIZ = RVIZ_FILE["Visualization Manager"]
 FOXGLOVE = json.loads((CHECKOUT / "foxglove" / "walker.json").read_text())
 # What each display of RViz takes.
 DISPLAYS = {
@@ -86,6 +87,19 @@ def test_rviz_looks_at_frames_and_namespaces_that_there_are(walk):
     assert display["Namespaces"] == {namespace: True for namespace, _ in markers}
     robot = ET.fromstring(walker_urdf(WalkerParameters.from_yaml(), description_settings()))
     assert {link.get("name") for link in robot.iter("link")} == set(transforms)
+
+
+def test_rviz_shows_the_newest_markers_not_a_queue_of_them():
+    (display,) = (one for one in RVIZ["Displays"] if one["Class"].endswith("MarkerArray"))
+    assert display["Topic"]["Depth"] == 1, "a robot model is at its newest pose, and markers would lag behind it"
+
+
+def test_rviz_has_a_place_for_every_panel():
+    # Panels that the state of the window does not name fill its left half. Qt writes names in UTF-16.
+    state = bytes.fromhex(RVIZ_FILE["Window Geometry"]["QMainWindow State"])
+    names = [panel["Name"] for panel in RVIZ_FILE["Panels"]]
+    assert names
+    assert all(name.encode("utf-16-be") in state for name in names)
 
 
 def test_foxglove_takes_topics_frames_and_namespaces_that_there_are(graph, walk):

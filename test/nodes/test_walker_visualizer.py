@@ -107,9 +107,28 @@ def test_markers_are_paths_reactions_and_ground_of_the_gait(walk):
         labels = [markers["joint_torque_sizes", number].text for number in range(4)]
         assert labels == [f"{round(torque, 1) + 0.0:.1f} N m" for torque in reference.effort]
         surface = markers["ground", 0].points
+        assert facing_up(surface)
+        assert len(markers["ground", 0].colors) == len(surface)
         base = transforms["base_link"].transform.translation.x
         assert min(point.x for point in surface) < base - 1 < base + 1 < max(point.x for point in surface)
         assert {point.z for point in surface} == {0.0}
+
+
+def facing_up(points):
+    """Whether all triangles of a list do: RViz draws the others black."""
+    corners = np.array([[point.x, point.y, point.z] for point in points]).reshape(-1, 3, 3)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return len(normals) > 0 and (normals[:, 2] > 0).all()
+
+
+def test_words_are_spaced_like_their_letters(walk):
+    # RViz takes a space's width from scale.x, and more than a metre if that is 0.
+    walk.announce()
+    walk.send(0.5)
+    _, markers = walk.picture()
+    labels = [one for one in markers.values() if one.type == Marker.TEXT_VIEW_FACING and one.text]
+    assert {one.ns for one in labels} == {"ground_metres", "ground_reaction_size", "joint_torque_sizes"}
+    assert all(0.25 <= one.scale.x / one.scale.z <= 1.0 for one in labels)
 
 
 def told(graph, reports):

@@ -25,6 +25,8 @@ _TORQUE_COLOUR: Colour = (0.45, 0.10, 0.55, 1.0)
 _WALKED_WIDTH, _AHEAD_WIDTH, _TICK_WIDTH = 0.006, 0.012, 0.008
 _SHAFT, _HEAD, _HEAD_LENGTH = 0.02, 0.045, 0.06
 _TEXT_HEIGHT = 0.06
+# RViz leaves more than a metre for a space unless scale.x tells how much; other displays ignore it.
+_SPACE_WIDTH = 0.03
 _GROUND_WIDTH = 0.6
 _TORQUE_WIDTH = 0.012
 _FORCE_LABEL_AHEAD = 0.2
@@ -77,6 +79,11 @@ class SceneMarkers:
         marker.color = ColorRGBA(**dict(zip("rgba", colour, strict=True)))
         return marker
 
+    def _label(self, namespace: str, number: int, colour: Colour) -> Marker:
+        label = self._marker(namespace, number, Marker.TEXT_VIEW_FACING, colour)
+        label.scale.x, label.scale.z = _SPACE_WIDTH, _TEXT_HEIGHT
+        return label
+
     def _path(self, namespace: str, side: int, path: FloatArray, width: float) -> Marker:
         marker = self._marker(namespace, side, Marker.LINE_STRIP, _SIDE_COLOURS[side])
         marker.scale.x = width
@@ -86,7 +93,7 @@ class SceneMarkers:
     def _reaction(self, side: int, foot: FloatArray, force: FloatArray, scale: float) -> list[Marker]:
         """Return the arrow of a ground reaction, which begins at the foot, and its size in words."""
         arrow = self._marker("ground_reaction", side, Marker.ARROW, _FORCE_COLOUR)
-        label = self._marker("ground_reaction_size", side, Marker.TEXT_VIEW_FACING, _TEXT_COLOUR)
+        label = self._label("ground_reaction_size", side, _TEXT_COLOUR)
         size = math.hypot(*force)
         if size < _LEAST_FORCE:
             return [_removed(arrow), _removed(label)]
@@ -95,7 +102,6 @@ class SceneMarkers:
         arrow.scale = Vector3(x=_SHAFT, y=_HEAD, z=_HEAD_LENGTH)
         middle = foot + 0.4 * scale * force
         label.pose.position = _point(middle[0] + _FORCE_LABEL_AHEAD, self._sideways[side], middle[1])
-        label.scale.z = _TEXT_HEIGHT
         label.text = f"{size:.0f} N"
         return [arrow, label]
 
@@ -106,8 +112,7 @@ class SceneMarkers:
         line = self._marker("joint_torques", number, Marker.LINE_STRIP, _TORQUE_COLOUR)
         line.scale.x = _TORQUE_WIDTH
         line.points = [_point(x, y, z) for x, z in arc.points.T.tolist()]
-        label = self._marker("joint_torque_sizes", number, Marker.TEXT_VIEW_FACING, _TORQUE_COLOUR)
-        label.scale.z = _TEXT_HEIGHT
+        label = self._label("joint_torque_sizes", number, _TORQUE_COLOUR)
         label.text = f"{round(arc.torque, 1) + 0.0:.1f} N m"
         label.pose.position = _point(arc.centre[0] + _LABEL_AHEAD[side], y, arc.centre[1] + _TEXT_HEIGHT)
         return [line, label]
@@ -119,8 +124,10 @@ class SceneMarkers:
         half = _GROUND_WIDTH / 2
         near, far = ([_point(x, y, z) for x, z in ground.T.tolist()] for y in (-half, half))
         for a, b, c, d in zip(near, near[1:], far, far[1:], strict=False):
-            # Both sides: displays cull triangles that are seen from behind.
-            surface.points += [a, b, c, c, b, d, a, c, b, c, d, b]
+            # Facing up; displays show the back too.
+            surface.points += [a, b, c, c, b, d]
+        # RViz's light comes from the camera and would leave flat ground black; coloured corners are not lit.
+        surface.colors = [surface.color] * len(surface.points)
         metres = range(math.ceil(ground[0, 0]), math.floor(ground[0, -1]) + 1)
         heights = np.interp(metres, ground[0], ground[1]).tolist()
         lines = self._marker("ground_metres", 0, Marker.LINE_LIST, _TEXT_COLOUR)
@@ -129,9 +136,8 @@ class SceneMarkers:
         for metre, height in zip(metres, heights, strict=True):
             lines.points += [_point(metre, -half, height), _point(metre, half, height)]
             # Few numbers are in use, so that a new metre takes the marker of one that is out of sight.
-            label = self._marker("ground_metres", 1 + metre % 5, Marker.TEXT_VIEW_FACING, _TEXT_COLOUR)
+            label = self._label("ground_metres", 1 + metre % 5, _TEXT_COLOUR)
             label.pose.position = _point(metre, -half, height - _TEXT_HEIGHT)
-            label.scale.z = _TEXT_HEIGHT
             label.text = f"{metre} m"
             labels.append(label)
         return [surface, lines, *labels]
