@@ -91,7 +91,7 @@ def test_rviz_looks_at_frames_and_namespaces_that_there_are(walk):
 
 def test_rviz_shows_the_newest_markers_not_a_queue_of_them():
     (display,) = (one for one in RVIZ["Displays"] if one["Class"].endswith("MarkerArray"))
-    assert display["Topic"]["Depth"] == 1, "a robot model is at its newest pose, and markers would lag behind it"
+    assert display["Topic"]["Depth"] == 1, "markers would lag behind the robot model"
 
 
 def test_rviz_has_a_place_for_every_panel():
