@@ -54,12 +54,13 @@ def test_progress_tells_stage_iteration_objective_infeasibility_and_time(clock):
     assert not session.stopped
 
 
-def test_a_callback_that_returns_false_cancels_this_and_every_further_solve():
+@pytest.mark.parametrize("kind", [bool, np.bool_])
+def test_a_callback_that_returns_false_cancels_this_and_every_further_solve(kind):
     told = []
 
     def cancel_at_the_third(progress):
         told.append(progress.iteration)
-        return len(told) < 3
+        return kind(len(told) < 3)
 
     session = SolveSession(solver_settings(), 1e6, cancel_at_the_third)
     assert run(session).status is Status.CANCELLED
@@ -69,6 +70,14 @@ def test_a_callback_that_returns_false_cancels_this_and_every_further_solve():
     assert later.status is Status.CANCELLED
     assert later.iterations == 0
     assert told == [0, 1, 2], "nobody is asked again after having cancelled"
+
+
+def test_a_callback_that_returns_nothing_only_watches():
+    told = []
+    session = SolveSession(solver_settings(), 1e6, told.append)
+    assert run(session).solved
+    assert session.verdict is None
+    assert len(told) > 1
 
 
 def test_the_time_limit_counts_over_all_solves(clock):

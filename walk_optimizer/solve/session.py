@@ -28,7 +28,7 @@ class SolveSession:
         Args:
             settings: Of the solver.
             time_limit: Of all solves together in [s].
-            progress: Told at each iteration; may cancel.
+            progress: Told at each iteration; returning False cancels, returning nothing does not.
 
         Raises:
             MissingDependencyError: the library of the back end is not installed.
@@ -124,4 +124,7 @@ class SolveSession:
         return self.verdict
 
     def _wanted(self) -> bool:
-        return self._progress is None or self._last is None or self._progress(self._last)
+        if self._progress is None or self._last is None:
+            return True
+        answer = self._progress(self._last)
+        return answer is None or bool(answer)

@@ -105,5 +105,5 @@ class Progress:
     elapsed: float
 
 
-# Called at every iteration; False asks the solve to stop.
-ProgressCallback = Callable[[Progress], bool]
+# Called at every iteration; False asks the solve to stop, None does not.
+ProgressCallback = Callable[[Progress], bool | None]
