@@ -1,5 +1,7 @@
 """Damage of every kind: found, named, and repaired without touching the original."""
 
+import errno
+import os
 import random
 import shutil
 import tracemalloc
@@ -19,7 +21,7 @@ from mcap.records import Chunk, Header
 from mcap.writer import Writer
 from recording.samples import JOINTS, PERIOD_NS, START_NS, STORE, joint_state, number_of, write_bag
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import Reader, StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
 from walk_optimizer.recording import (
@@ -30,7 +32,7 @@ from walk_optimizer.recording import (
     read_messages,
     repair_bag,
 )
-from walk_optimizer.recording.errors import BagExistsError, NotABagError
+from walk_optimizer.recording.errors import BagExistsError, CompressedBagError, NotABagError
 from walk_optimizer.recording.framing import MAGIC
 from walk_optimizer.recording.records import DamageKind
 
@@ -203,7 +205,14 @@ def test_a_split_bag_keeps_its_files_and_its_texts(tmp_path):
 
 def test_a_bag_without_readable_metadata_is_still_a_bag(tmp_path):
     bag = write_bag(tmp_path / "walk", range(10))
-    for text in ("", "rosbag2_bagfile_information: [", "rosbag2_bagfile_information: 3"):
+    for text in (
+        "",
+        "rosbag2_bagfile_information: [",
+        "rosbag2_bagfile_information: 3",
+        "[" * 5000,
+        "&a [*a]",
+        "rosbag2_bagfile_information: {? [a] : b, ? {} : c}",
+    ):
         (bag / "metadata.yaml").write_text(text)
         assert describe_bag(bag).message_count == 11
         assert not describe_bag(bag).has_metadata
@@ -251,9 +260,34 @@ def test_repair_is_advised_only_where_something_can_be_saved(tmp_path):
         assert words in format_bag(describe_bag(cut))
 
 
-@pytest.mark.parametrize("use", [describe_bag, repair_bag, lambda path: list(read_messages(path))])
-@pytest.mark.parametrize("kind", ["missing", "empty folder", "text", "noise", "sqlite"])
-def test_what_is_no_bag_gives_one_typed_error(tmp_path, use, kind):
+def bag_of_rosbags(path: Path, plugin: StoragePlugin, mode: CompressionMode = CompressionMode.NONE) -> Path:
+    writer = RosbagsWriter(path, version=9, storage_plugin=plugin)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection(JOINTS.name, JOINTS.type_name, typestore=STORE)
+        for number in range(100):
+            writer.write(connection, START_NS + number * PERIOD_NS, joint_state(number))
+    return path
+
+
+READERS = pytest.mark.parametrize("use", [describe_bag, repair_bag, lambda path: list(read_messages(path))])
+
+
+@READERS
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("missing", "There is no .*walk"),
+        ("empty folder", "walk holds no .mcap file; name a bag directory or an .mcap file"),
+        ("text", "walk is no MCAP file: it begins with b'a shoppi'"),
+        ("noise", "walk is no MCAP file"),
+        ("sqlite", "walk holds no .mcap file: its storage is 'sqlite3', not 'mcap'; `ros2 bag convert`"),
+        ("named pipe", "walk is no regular file"),
+        ("size unknown", "walk is no MCAP file: it begins with"),
+        ("name too long", "Cannot read .* characters .*: File name too long"),
+    ],
+)
+def test_what_is_no_bag_gives_one_typed_error(tmp_path, use, kind, words):
     path = tmp_path / "walk"
     if kind == "empty folder":
         path.mkdir()
@@ -262,25 +296,74 @@ def test_what_is_no_bag_gives_one_typed_error(tmp_path, use, kind):
     elif kind == "noise":
         path.write_bytes(random.Random(1).randbytes(100_000))
     elif kind == "sqlite":
-        with RosbagsWriter(path, version=9, storage_plugin=StoragePlugin.SQLITE3):
-            pass
-    with pytest.raises(NotABagError, match="walk"):
+        bag_of_rosbags(path, StoragePlugin.SQLITE3)
+    elif kind == "named pipe":
+        os.mkfifo(path)
+    elif kind == "size unknown":
+        path.symlink_to("/proc/cpuinfo")
+    elif kind == "name too long":
+        path = tmp_path / ("walk" * 100)
+    with pytest.raises(NotABagError, match=words):
         use(path)
     assert not (tmp_path / "walk_repaired").exists()
 
 
-def test_a_sqlite_bag_is_named_as_one(tmp_path):
-    with RosbagsWriter(tmp_path / "walk", version=9, storage_plugin=StoragePlugin.SQLITE3):
-        pass
-    with pytest.raises(NotABagError, match="its storage is 'sqlite3', not 'mcap'"):
-        describe_bag(tmp_path / "walk")
+@READERS
+@pytest.mark.parametrize("name", [".", "walk_0.mcap"])
+def test_what_may_not_be_looked_at_is_told(tmp_path, monkeypatch, use, name):
+    bag = write_bag(tmp_path / "walk", range(10))
+
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    # Root may look everywhere, so the operating system is made to refuse.
+    monkeypatch.setattr(Path, "iterdir" if name == "." else "stat", refuse)
+    with pytest.raises(NotABagError, match=r"Cannot read .*walk.*: Permission denied"):
+        use(bag / name)
+
+
+@READERS
+@pytest.mark.parametrize("mode", [CompressionMode.MESSAGE, CompressionMode.FILE])
+def test_a_bag_that_rosbag2_compressed_is_refused(tmp_path, use, mode):
+    bag = bag_of_rosbags(tmp_path / "walk", StoragePlugin.MCAP, mode)
+    words = f"walk was compressed by rosbag2 in mode {mode.name}, allowed are .*`ros2 bag convert` it first"
+    with pytest.raises(CompressedBagError, match=words):
+        use(bag)
+    assert [path.name for path in tmp_path.iterdir()] == ["walk"]
+
+
+def test_a_single_file_of_compressed_messages_is_refused_too(tmp_path):
+    bag = bag_of_rosbags(tmp_path / "walk", StoragePlugin.MCAP, CompressionMode.MESSAGE)
+    with pytest.raises(CompressedBagError, match="compressed by rosbag2 in mode MESSAGE"):
+        repair_bag(bag / "walk.mcap")
+
+
+@pytest.mark.parametrize(
+    ("custom_data", "expected"),
+    [
+        ("[1, 2]", ()),
+        ("hello", ()),
+        ("5", ()),
+        ("{1: 2, a: [b], e: null}", (("1", "2"),)),
+        ("{a: b}", (("a", "b"),)),
+    ],
+)
+def test_custom_data_that_make_no_sense_are_none(tmp_path, custom_data, expected):
+    bag = write_bag(tmp_path / "walk", range(10))
+    text = f"rosbag2_bagfile_information: {{custom_data: {custom_data}, ros_distro: [x]}}"
+    (bag / "metadata.yaml").write_text(text)
+    info = describe_bag(bag)
+    assert (info.custom_data, info.ros_distro, info.message_count) == (expected, "", 11)
+
+
+def test_a_file_on_its_own_still_tells_where_it_comes_from(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROS_DISTRO", "humble")
+    info = describe_bag(write_bag(tmp_path / "walk", range(10)) / "walk_0.mcap")
+    assert (info.ros_distro, info.has_metadata) == ("humble", False)
 
 
 def test_a_bag_of_another_writer_is_described_and_read(tmp_path):
-    with RosbagsWriter(tmp_path / "walk", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection(JOINTS.name, JOINTS.type_name, typestore=STORE)
-        for number in range(100):
-            writer.write(connection, START_NS + number * PERIOD_NS, joint_state(number))
+    bag_of_rosbags(tmp_path / "walk", StoragePlugin.MCAP)
     info = describe_bag(tmp_path / "walk")
     assert info.is_whole
     assert (info.message_count, info.start_time_ns, info.duration_ns) == (100, START_NS, 99 * PERIOD_NS)

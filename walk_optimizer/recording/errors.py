@@ -45,3 +45,7 @@ class MessageDefinitionError(RecordingError):
 
 class NotABagError(RecordingError):
     """The path is no bag that can be read: missing, of another format, or beyond recognition."""
+
+
+class CompressedBagError(NotABagError):
+    """The bag was compressed by rosbag2 in a way that its .mcap files do not show."""

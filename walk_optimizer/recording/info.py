@@ -5,7 +5,14 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from walk_optimizer.recording.metadata import FileEntry, bag_files, read_metadata
+from walk_optimizer.recording.bag_directory import (
+    Description,
+    bag_files,
+    parse_description,
+    read_description,
+    require_readable,
+)
+from walk_optimizer.recording.metadata import FileEntry
 from walk_optimizer.recording.records import Damage, DamageKind
 from walk_optimizer.recording.scan import FileScan
 from walk_optimizer.recording.topics import NANOSECONDS_PER_SECOND, TopicInfo
@@ -48,9 +55,9 @@ class BagInfo:
     Attributes:
         path: The bag.
         files: Its files, in the order of recording.
-        ros_distro: ROS distribution that metadata.yaml names; empty when unknown.
+        ros_distro: ROS distribution that the bag names; empty when unknown.
         has_metadata: Whether there is a metadata.yaml that can be read.
-        custom_data: Free texts of metadata.yaml.
+        custom_data: Free texts of the bag.
     """
 
     path: Path
@@ -125,15 +132,20 @@ def describe_bag(path: Path) -> BagInfo:
 
     Raises:
         NotABagError: If the path is no bag that can be read.
+        CompressedBagError: If rosbag2 has compressed its files or messages.
     """
-    metadata = read_metadata(path)
-    custom = metadata.get("custom_data") or {}
+    scans = [FileScan(file) for file in bag_files(path)]
+    files = tuple(_describe_file(scan) for scan in scans)
+    metadata = read_description(path)
+    # A single file, or a bag without metadata.yaml, still describes itself at its end.
+    description = metadata or parse_description(scans[-1].bag_metadata or "") or Description()
+    require_readable(path, description)
     return BagInfo(
         path=path,
-        files=tuple(_describe_file(file) for file in bag_files(path)),
-        ros_distro=str(metadata.get("ros_distro", "")),
-        has_metadata=bool(metadata),
-        custom_data=tuple((str(key), str(value)) for key, value in custom.items()),
+        files=files,
+        ros_distro=description.ros_distro,
+        has_metadata=metadata is not None,
+        custom_data=description.custom_data,
     )
 
 
@@ -158,8 +170,8 @@ def format_bag(info: BagInfo) -> str:
     return "\n".join(lines)
 
 
-def _describe_file(path: Path) -> FileInfo:
-    scan = FileScan(path)
+def _describe_file(scan: FileScan) -> FileInfo:
+    path = scan.path
     counts: Counter[str] = Counter()
     start: int | None = None
     end: int | None = None

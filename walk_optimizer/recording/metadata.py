@@ -1,21 +1,17 @@
-"""The description of a bag: metadata.yaml of version 9, and the names of its files."""
+"""The description of a bag that is written: metadata.yaml of version 9, and the names of its files."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import yaml
 
-from walk_optimizer.recording.errors import NotABagError
 from walk_optimizer.recording.topics import INFINITE_NS, TopicInfo
 
 METADATA_FILE = "metadata.yaml"
 METADATA_VERSION = 9
 STORAGE_IDENTIFIER = "mcap"
-
-_TOP_LEVEL_KEY = "rosbag2_bagfile_information"
+TOP_LEVEL_KEY = "rosbag2_bagfile_information"
 
 
 @dataclass(frozen=True)
@@ -79,7 +75,7 @@ class BagMetadata:
 
     def to_file(self) -> str:
         """Return the text of metadata.yaml."""
-        return yaml.safe_dump({_TOP_LEVEL_KEY: self.to_mapping()}, sort_keys=False)
+        return yaml.safe_dump({TOP_LEVEL_KEY: self.to_mapping()}, sort_keys=False)
 
     def _topic(self, topic: TopicInfo) -> dict[str, Any]:
         return {
@@ -97,45 +93,6 @@ class BagMetadata:
 def file_name(bag_name: str, number: int) -> str:
     """Return the name of a file of a bag, counted from 0."""
     return f"{bag_name}_{number}.mcap"
-
-
-def read_metadata(directory: Path) -> Mapping[str, Any]:
-    """Return the description of a bag directory; empty when it has none that can be read.
-
-    What is in the files counts, so a bag stays a bag without its metadata.yaml.
-    """
-    try:
-        content = yaml.safe_load((directory / METADATA_FILE).read_text(encoding="utf-8"))
-        description = content[_TOP_LEVEL_KEY]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
-        return {}
-    return description if isinstance(description, Mapping) else {}
-
-
-def bag_files(path: Path) -> tuple[Path, ...]:
-    """Return the files of a bag in the order of recording.
-
-    Args:
-        path: A bag directory, or a single .mcap file.
-
-    Raises:
-        NotABagError: If there is nothing that could be a bag.
-    """
-    if not path.exists():
-        raise NotABagError(f"There is no {path}")
-    if not path.is_dir():
-        return (path,)
-    # Not the list in metadata.yaml: a killed recording may have begun a file that is not in it.
-    files = sorted(path.glob("*.mcap"), key=_recording_order)
-    if not files:
-        storage = read_metadata(path).get("storage_identifier", "unknown")
-        raise NotABagError(f"{path} holds no .mcap file (its storage is {storage!r}, not 'mcap')")
-    return tuple(files)
-
-
-def _recording_order(path: Path) -> tuple[int, str]:
-    number = re.search(r"_(\d+)$", path.stem)
-    return (int(number.group(1)) if number else 0, path.name)
 
 
 def _span(entries: Sequence[FileEntry]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from walk_optimizer.recording.metadata import bag_files
+from walk_optimizer.recording.bag_directory import bag_files
 from walk_optimizer.recording.scan import BagMessage, FileScan
 
 __all__ = ["BagMessage", "read_messages"]

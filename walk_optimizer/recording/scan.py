@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
+from stat import S_ISREG
 
 from mcap.records import Channel, McapRecord, Message, Metadata, Schema
 
@@ -67,9 +68,16 @@ class FileScan:
             NotABagError: If the file is missing or no MCAP file at all.
         """
         try:
+            # Looked at first, because to open a named pipe would wait for its writer forever.
+            if not S_ISREG(self.path.stat().st_mode):
+                raise NotABagError(f"{self.path} is no regular file; name a bag directory or an .mcap file")
             with self.path.open("rb") as stream:
-                if self._is_empty(stream.read(len(MAGIC))):
+                start = stream.read(len(MAGIC))
+                if self._is_empty(start):
                     return
+                # Files of /proc have content, but no size, and so no memory map.
+                if not self.path.stat().st_size:
+                    raise self._no_mcap(start)
                 with mmap(stream.fileno(), 0, access=ACCESS_READ) as data:
                     self._require_mcap(data)
                     yield from self._walk(data)
@@ -86,7 +94,12 @@ class FileScan:
 
     def _require_mcap(self, data: mmap) -> None:
         if data[: len(MAGIC)] != MAGIC and find_chunk(data, 0) is None:
-            raise NotABagError(f"{self.path} is no MCAP file: it begins with {data[: len(MAGIC)]!r}")
+            raise self._no_mcap(data[: len(MAGIC)])
+
+    def _no_mcap(self, start: bytes) -> NotABagError:
+        return NotABagError(
+            f"{self.path} is no MCAP file: it begins with {start!r}, such a file with {MAGIC!r}"
+        )
 
     def _walk(self, data: mmap) -> Iterator[BagMessage]:
         # The end of the file repeats the topics: they are then known even if the chunk that

@@ -1,0 +1,134 @@
+"""A bag as it lies on the disk: its files, and what it says about itself, read with distrust."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from walk_optimizer.errors import quoted, shortened
+from walk_optimizer.recording.errors import CompressedBagError, NotABagError
+from walk_optimizer.recording.metadata import METADATA_FILE, STORAGE_IDENTIFIER, TOP_LEVEL_KEY
+
+# Compression that chunks don't tell: of whole files, or of each message. A third one, storage, is theirs.
+_HIDDEN_COMPRESSIONS = ("FILE", "MESSAGE")
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a bag says about itself; what makes no sense is as if it were not there.
+
+    Attributes:
+        storage: Name of the storage format; empty when unknown.
+        compression_mode: In capitals, such as MESSAGE; empty for none.
+        ros_distro: ROS distribution that recorded the bag; empty when unknown.
+        custom_data: Free texts.
+    """
+
+    storage: str = ""
+    compression_mode: str = ""
+    ros_distro: str = ""
+    custom_data: tuple[tuple[str, str], ...] = ()
+
+    @classmethod
+    def from_mapping(cls, content: Mapping[str, Any]) -> "Description":
+        """Read a description of any version."""
+        custom = content.get("custom_data")
+        return cls(
+            storage=_text(content, "storage_identifier"),
+            compression_mode=_text(content, "compression_mode").upper(),
+            ros_distro=_text(content, "ros_distro"),
+            custom_data=tuple(
+                (str(key), str(value))
+                for key, value in (custom.items() if isinstance(custom, Mapping) else ())
+                if isinstance(key, str | int) and isinstance(value, str | int | float)
+            ),
+        )
+
+
+def read_description(directory: Path) -> Description | None:
+    """Return what the metadata.yaml of a bag directory says; None when there is none that can be read.
+
+    What is in the files counts, so a bag stays a bag without its metadata.yaml.
+    """
+    try:
+        text = (directory / METADATA_FILE).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+    content = _load(text)
+    return _described(content.get(TOP_LEVEL_KEY)) if isinstance(content, Mapping) else None
+
+
+def parse_description(text: str) -> Description | None:
+    """Return what the description within an .mcap file says; None when it can't be read."""
+    return _described(_load(text))
+
+
+def require_readable(path: Path, description: Description | None) -> None:
+    """Refuse a bag whose messages are not what its chunks hold.
+
+    Raises:
+        CompressedBagError: rosbag2 has compressed its files or messages.
+    """
+    if description is not None and description.compression_mode in _HIDDEN_COMPRESSIONS:
+        raise CompressedBagError(
+            f"{path} was compressed by rosbag2 in mode {description.compression_mode}, allowed are "
+            "compressed chunks; `ros2 bag convert` it first, with compression_mode left empty"
+        )
+
+
+def bag_files(path: Path) -> tuple[Path, ...]:
+    """Return the files of a bag in the order of recording.
+
+    Args:
+        path: A bag directory, or a single .mcap file.
+
+    Raises:
+        NotABagError: If there is nothing that could be a bag, or it can't be looked at.
+        CompressedBagError: If rosbag2 has compressed its files or messages.
+    """
+    try:
+        if not path.exists():
+            raise NotABagError(f"There is no {path}")
+        return _files_of(path) if path.is_dir() else (path,)
+    except OSError as error:
+        raise NotABagError(f"Cannot read {shortened(str(path))}: {error.strerror}") from error
+
+
+def _files_of(directory: Path) -> tuple[Path, ...]:
+    description = read_description(directory)
+    require_readable(directory, description)
+    # Not the list in metadata.yaml: a killed recording may have begun a file that is not in it.
+    # Not glob, to which a folder that can't be read is an empty one.
+    files = sorted((path for path in directory.iterdir() if path.suffix == ".mcap"), key=_recording_order)
+    if not files:
+        storage = description.storage if description else ""
+        other = storage not in ("", STORAGE_IDENTIFIER)
+        reason = f": its storage is {quoted(storage)}, not {STORAGE_IDENTIFIER!r}" if other else ""
+        advice = "; `ros2 bag convert` it first" if other else "; name a bag directory or an .mcap file"
+        raise NotABagError(f"{directory} holds no .mcap file{reason}{advice}")
+    return tuple(files)
+
+
+def _recording_order(path: Path) -> tuple[int, str]:
+    number = re.search(r"_(\d+)$", path.stem)
+    return (int(number.group(1)) if number else 0, path.name)
+
+
+def _load(text: str) -> object:
+    try:
+        content: object = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, TypeError, RecursionError):
+        return None
+    return content
+
+
+def _described(content: object) -> Description | None:
+    return Description.from_mapping(content) if isinstance(content, Mapping) else None
+
+
+def _text(content: Mapping[str, Any], key: str) -> str:
+    value = content.get(key)
+    return value if isinstance(value, str) else ""
