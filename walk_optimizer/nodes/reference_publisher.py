@@ -105,8 +105,8 @@ class ReferencePublisherNode(ManagedNode):
 
     async def _set_gait(self, request: SetGait.Request, response: SetGait.Response) -> None:
         wanted = GaitRequest.for_speed(request.speed, request.spring_mode)
-        self._speeds.forget()
-        response.message = await self._commands.walk_at(wanted)
+        with self._speeds.set_point():
+            response.message = await self._commands.walk_at(wanted)
         self.get_logger().info(response.message)
 
     async def _stop(self, _request: Trigger.Request, response: Trigger.Response) -> None:

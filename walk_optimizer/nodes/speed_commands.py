@@ -1,7 +1,8 @@
 """Speeds that come as topics: `~/target_speed`, sent once, and `~/cmd_vel`, a stream that must go on."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,7 +49,8 @@ class SpeedCommands:
     A set-point supersedes what is under way at once. A stream does so when it holds a speed, that is sends it
     twice in a row: of one that changes all the time, one speed after the other is followed to its end.
 
-    A speed that is refused changes nothing, and keeps no stream alive. Speed 0 is a stop.
+    A speed that is refused changes nothing, and keeps a stream alive only as long as it is worked on. Speed
+    0 is a stop.
     """
 
     def __init__(self, node: ManagedNode, commands: WalkCommands) -> None:
@@ -82,7 +84,8 @@ class SpeedCommands:
     def forget(self) -> None:
         """Drop what was asked for: another command has come than by these topics."""
         self._waiting = self._current = None
-        self._watch_no_more()
+        self.watch.end()
+        self._settle()
 
     def give_up(self) -> None:
         """Drop what was asked for, because of an emergency stop; a stream must go on none the less.
@@ -90,23 +93,42 @@ class SpeedCommands:
         If it does not, the walk that goes on after the emergency comes to a stand.
         """
         self._waiting = self._current = None
+        self.watch.refused()
+
+    @contextmanager
+    def set_point(self) -> Iterator[None]:
+        """Drop what was asked for while another command is carried out, which holds until the next one.
+
+        If it is refused, a stream that came before has to go on.
+        """
+        self._waiting = self._current = None
+        self.watch.suspend()
+        try:
+            yield
+        except SupersededError:  # What becomes of the watch is up to the command that came since.
+            raise
+        except Exception:
+            self._refuse()
+            raise
+        self._settle()
 
     def _on_target_speed(self, message: Float64) -> None:
         target = self._target(message.data) if self._node.active else None
         if target is not None:
-            self._watch_no_more()
+            self.watch.suspend()
             self._take(target, supersedes=True)
 
     def _on_twist(self, message: Twist) -> None:
         target = self._twist_target(message) if self._node.active else None
-        if target is not None:
+        if target is None:
+            return
+        if not self._was_just_refused(target):
             self.watch.heard(self._now())
             # Only now: each time that the executor wakes costs the stream a tick at 1 kHz.
             if self._timer is None:
                 self._timer = self._node.repeat(_WATCH_PERIOD, self._look)
-            if not self._was_just_refused(target):
-                self._take(target, supersedes=target == self._last_of_stream)
-            self._last_of_stream = target
+            self._take(target, supersedes=target == self._last_of_stream)
+        self._last_of_stream = target
 
     def _twist_target(self, message: Twist) -> _Target | None:
         """Return what a velocity asks for, and warn of what it asks for in vain; None where it is refused."""
@@ -139,6 +161,8 @@ class SpeedCommands:
         """
         if target == self._current:
             self._waiting, self._commands.refusal = None, ""
+            if not self._commands.under_way:
+                self._settle()
             return
         if target == _STAND:
             # A stop waits for nothing; what is being fetched then comes too late to count.
@@ -170,11 +194,14 @@ class SpeedCommands:
         except Exception as error:
             if self._current is target:
                 self._current = None
+            if isinstance(error, WalkOptimizerError):
+                self._tell_refusal(error)
+                self._refused = target, time.monotonic()
+            self._refuse()
             if not isinstance(error, WalkOptimizerError):
                 raise
-            self._tell_refusal(error)
-            self._refused = target, time.monotonic()
             return
+        self._settle()
         self._node.get_logger().info(text, throttle_duration_sec=1.0)
 
     def _was_just_refused(self, target: _Target) -> bool:
@@ -197,11 +224,17 @@ class SpeedCommands:
         self._commands.refusal = str(error)
         self._node.get_logger().warning(f"target speed refused: {error}", throttle_duration_sec=1.0)
 
-    def _watch_no_more(self) -> None:
-        self.watch.end()
-        if self._timer is not None:
+    def _settle(self) -> None:
+        """Take note that what was asked for last is carried out; if that is no stream, watch no more."""
+        self.watch.followed()
+        if self._timer is not None and not self.watch.active:
             self._node.destroy_timer(self._timer)
-        self._timer = None
+            self._timer = None
+
+    def _refuse(self) -> None:
+        """Take note that what was asked for last is refused: a stream before it may be stale by now."""
+        self.watch.refused()
+        self._look()
 
     def _look(self) -> None:
         """Stop the walk when a stream of speeds has fallen silent."""
