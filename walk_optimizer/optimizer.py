@@ -3,9 +3,10 @@
 Kinematic guesses are solved with plain single support on a coarse grid; the best distinct optima go
 on to the requested grid with each contact family. The best of all starts the complementarity
 problem, which is free to find other contacts. Its contact phases are then solved once more on an
-accurate grid.
+accurate grid, where the refinements of neighbouring gaits are continued too.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -18,7 +19,9 @@ from walk_optimizer.guess import Start
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.refinement import refined_gait
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.resolve import continued
 from walk_optimizer.search import Candidate, Search, distinct
+from walk_optimizer.shadowing import with_replayable_start
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import SolverSettings, solver_settings
 from walk_optimizer.solve.status import FamilyViolation, ProgressCallback, SolveReport, Status
@@ -26,6 +29,8 @@ from walk_optimizer.starts import kinematic_starts
 
 # A residual of more than so many tolerances is not merely short of convergence.
 _FAR = 1000.0
+# Refinements whose efforts agree to this relative difference are taken for one: so much is due to meshes.
+_SAME_EFFORT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -86,23 +91,42 @@ def optimize(
     outcome = _Pipeline(request, walker, settings, session).run(seeds, from_scratch, others)
     if outcome.gait is None or session.stopped or not refine:
         return outcome
-    return replace(with_refinement(outcome.gait, session), others=outcome.others)
+    return replace(with_refinement(outcome.gait, session, seeds), others=outcome.others)
 
 
-def with_refinement(gait: Gait, session: SolveSession) -> Outcome:
+def with_refinement(gait: Gait, session: SolveSession, seeds: Sequence[Gait] = ()) -> Outcome:
     """Return the outcome of a solved gait with its refinement, which the time limit may prevent.
 
     Args:
         gait: The gait on the report's grid.
         session: Clock, cancelling and progress.
+        seeds: Gaits of neighbouring requests, whose refinements may lead to a better one.
     """
     refined = refined_gait(gait, session)
+    refined = with_continuation(replace(gait, refined=refined), seeds, session).refined
     report = replace(gait.report, iterations=session.iterations, solve_time=session.elapsed)
     if session.verdict is Status.CANCELLED:
         return Outcome(None, replace(report, status=session.verdict, message=session.verdict.sentence))
     if session.stopped:
         report = replace(report, message=f"{report.message}; the time limit cut the refinement short")
     return Outcome(replace(gait, refined=refined, report=report), report)
+
+
+def with_continuation(gait: Gait, seeds: Sequence[Gait], session: SolveSession) -> Gait:
+    """Return a gait with the refinement that seeds lead to, where that is better than its own.
+
+    The best optimum of the report's grid need not lead to the best one of the accurate grid.
+
+    Args:
+        gait: The gait, refined or not.
+        seeds: Refined gaits of neighbouring requests.
+        session: Clock, cancelling and progress.
+    """
+    found = continued(gait.request, [replace(seed, walker=gait.walker) for seed in seeds], session)
+    own = math.inf if gait.refined is None else gait.refined.trajectory.torque_effort
+    if found is None or found.trajectory.torque_effort >= own * (1 - _SAME_EFFORT):
+        return gait
+    return replace(gait, refined=with_replayable_start(gait.walker, gait.request, found))
 
 
 class _Pipeline:

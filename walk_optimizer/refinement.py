@@ -34,6 +34,8 @@ FloatArray = NDArray[np.float64]
 _FEWEST_INTERVALS = 3
 _MOST_PHASES = 6
 _ROUNDS = 10
+# Further halvings where each interval is accurate enough, but not all of them together.
+_FINER_ROUNDS = 2
 # Single support needs up to 70 iterations from the report's grid. Contact phases that the continuous problem
 # does not have never converge, and take three times as long an iteration.
 _MOST_ITERATIONS = 200
@@ -75,7 +77,7 @@ def refined_gait(gait: Gait, session: SolveSession) -> RefinedGait | None:
         gait: The gait on the report's grid.
         session: Clock, cancelling and progress.
     """
-    refined = certified_refinement(gait.walker, gait.request, refine(gait, session))
+    refined = RefinedSolves(gait.request, gait.walker, session).certified(refine(gait, session))
     return None if refined is None else with_replayable_start(gait.walker, gait.request, refined)
 
 
@@ -153,6 +155,21 @@ class RefinedSolves:
             finer = errors.divided(mesh)
             best = self.solved(finer, resampled(trajectory, best.spring, mesh, finer))
         return best
+
+    def certified(self, solution: RefinedSolution) -> RefinedGait | None:
+        """Return an adapted solution with its certificate; None where there is none, also on finer meshes."""
+        gait = certified_refinement(self.walker, self.request, solution)
+        for _ in range(_FINER_ROUNDS):
+            if gait is not None or solution.trajectory is None or not solution.met:
+                break
+            solution = self.adapted(self._on_halves(solution.mesh, solution.trajectory, solution.spring))
+            gait = certified_refinement(self.walker, self.request, solution)
+        return gait
+
+    def _on_halves(self, mesh: Mesh, trajectory: RefinedTrajectory, spring: KneeSpring) -> RefinedSolution:
+        """Return the solution on a mesh whose less accurate intervals are halved."""
+        finer = MeshErrors.of(self.walker, self.request.step_length, spring, trajectory).halved(mesh)
+        return self.solved(finer, resampled(trajectory, spring, mesh, finer))
 
     def solved(
         self, mesh: Mesh, points: RefinedPoints, most_iterations: int = _MOST_ITERATIONS

@@ -54,7 +54,27 @@ def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSess
     solves = RefinedSolves(request, walker, session)
     solution = solves.solved(mesh, guess)
     gait = certified_refinement(walker, request, solution)
-    return gait or certified_refinement(walker, request, solves.adapted(solution))
+    return gait or solves.certified(solves.adapted(solution))
+
+
+def continued(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSession) -> RefinedGait | None:
+    """Return the best certified gait that single neighbours lead to; None where none does.
+
+    Args:
+        request: Speed, step and spring mode.
+        neighbours: Gaits of the same walker; those that are not refined, or use other contacts than
+            single support, are left out.
+        session: Clock, cancelling and progress.
+    """
+    fit = [one for one in neighbours if one.refined is not None and _is_single_support(one.refined)]
+    found = session.map(lambda one: resolve(request, [one], session), fit)
+    certified = (one for one in found if one is not None)
+    return min(certified, key=lambda one: one.trajectory.torque_effort, default=None)
+
+
+def _is_single_support(refined: RefinedGait) -> bool:
+    trajectory = refined.trajectory
+    return not (trajectory.impulses[1:].any() or trajectory.forces[:, :, 2:].any())
 
 
 def _refined_of(gait: Gait) -> RefinedGait:
@@ -74,9 +94,9 @@ def mesh_of(gait: Gait, refined: RefinedGait) -> Mesh:
     Raises:
         InvalidRequestError: it has other contacts.
     """
-    trajectory = refined.trajectory
-    if trajectory.impulses[1:].any() or trajectory.forces[:, :, 2:].any():
+    if not _is_single_support(refined):
         raise InvalidRequestError(f"the gait at {gait.speed:.4f} m/s is not one of single support")
+    trajectory = refined.trajectory
     return Mesh(
         phases_of(single_impact(gait.trajectory.points)), (trajectory.lengths / trajectory.step_time,)
     )

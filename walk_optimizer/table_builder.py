@@ -3,7 +3,7 @@
 Each entry is first searched for from scratch, the entries in parallel. Then every entry is continued
 from its neighbours in speed and from the mode with less freedom, until no entry improves: none is
 left that its neighbour leads to a better optimum of. At last each is refined, from all good optima that
-were met on the way.
+were met on the way, and the refinements are continued from their neighbours in the same way.
 """
 
 import math
@@ -16,7 +16,7 @@ from multiprocessing import get_context
 
 from walk_optimizer.gait import Gait
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
-from walk_optimizer.optimizer import Outcome, optimize, with_refinement
+from walk_optimizer.optimizer import Outcome, optimize, with_continuation, with_refinement
 from walk_optimizer.request import GaitRequest, gait_table_settings
 from walk_optimizer.search import SAME_OPTIMUM
 from walk_optimizer.solve.session import SolveSession
@@ -35,7 +35,7 @@ class TableProgress:
     """One solve of the table has ended.
 
     Attributes:
-        stage: `search`, `continuation` or `refinement`.
+        stage: `search`, `continuation`, `refinement` or `refined continuation`.
         done: Solves that have ended in this stage.
         total: Solves of this stage.
         request: What was solved for.
@@ -49,6 +49,12 @@ class TableProgress:
     request: GaitRequest
     outcome: Outcome
     kept: bool
+
+
+@dataclass(frozen=True)
+class _RefinedJob:
+    gait: Gait
+    seeds: tuple[Gait, ...]
 
 
 @dataclass(frozen=True)
@@ -78,6 +84,13 @@ def _refine(gait: Gait) -> Outcome:
     """Refine one entry, in a process of the pool."""
     settings = table_solver_settings()
     return with_refinement(gait, SolveSession(settings, settings.time_limit, None))
+
+
+def _continue_refined(job: _RefinedJob) -> Outcome:
+    """Continue the refinements of neighbours, in a process of the pool."""
+    settings = table_solver_settings()
+    session = SolveSession(settings, settings.time_limit, None)
+    return Outcome(with_continuation(job.gait, job.seeds, session), job.gait.report)
 
 
 def build_table(
@@ -142,7 +155,32 @@ class _Builder:
             if not improved:
                 break
         self._refine()
+        self._continue_refinements()
         return self.table
+
+    def _continue_refinements(self) -> None:
+        """Continue the refinements of all entries until none improves."""
+        improved = set(self.table)
+        for _ in range(_MAXIMUM_SWEEPS):
+            improved = self._continue_refined(improved)
+            if not improved:
+                break
+
+    def _continue_refined(self, improved: set[Key]) -> set[Key]:
+        """Continue refinements that improved to the entries next to them; return what improves in turn."""
+        seeds = {key: self._seeds(key, improved) for key in self.table}
+        jobs = {key: _RefinedJob(self.table[key], found) for key, found in seeds.items() if found}
+        futures = {self.pool.submit(_continue_refined, job): key for key, job in jobs.items()}
+        better = set()
+        for done, future in enumerate(as_completed(futures), start=1):
+            key, outcome = futures[future], future.result()
+            kept = outcome.gait is not None and self._refines_better(key, outcome.gait)
+            if kept and outcome.gait is not None:
+                self.table[key] = outcome.gait
+                better.add(key)
+            stage = "refined continuation"
+            self._tell(TableProgress(stage, done, len(futures), self.requests[key], outcome, kept))
+        return better
 
     def _refine(self) -> None:
         """Add the accurate solution to every entry: the best that any of its good optima leads to.
@@ -184,11 +222,15 @@ class _Builder:
 
     def _continuation(self, key: Key, improved: set[Key]) -> _Job:
         """Return the job that continues an entry from those of its neighbours that have changed."""
+        seeds = (loosened(seed, key[1]) for seed in self._seeds(key, improved))
+        return self._job(key, tuple(seeds), from_scratch=False)
+
+    def _seeds(self, key: Key, improved: set[Key]) -> tuple[Gait, ...]:
+        """Return those of the entries that may lead to a better one of this key that have changed."""
         index, mode = key
         neighbours = [(index - 1, mode), (index + 1, mode)]
         neighbours += [(index, lesser) for lesser in _MODES[: _MODES.index(mode)]]
-        seeds = tuple(self.table[one] for one in neighbours if one in improved)
-        return self._job(key, tuple(loosened(seed, mode) for seed in seeds), from_scratch=False)
+        return tuple(self.table[one] for one in neighbours if one in improved)
 
     def _solve(self, jobs: list[_Job], stage: str) -> set[Key]:
         """Run the jobs, keep what is better, and return the keys of the entries that improved."""

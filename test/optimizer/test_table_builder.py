@@ -1,11 +1,13 @@
 """The table's bookkeeping, on a pool that solves nothing."""
 
 from concurrent.futures import Future
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
 from walk_optimizer import table_builder
+from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.optimizer import Outcome
 from walk_optimizer.request import gait_table_settings
@@ -43,3 +45,33 @@ def test_an_interrupted_build_drops_its_queue(pool):
     with pytest.raises(KeyboardInterrupt):
         table_builder.build_table(WalkerParameters(), on_progress=interrupt)
     assert pool.shutdowns == [{"cancel_futures": True}]
+
+
+def test_refinements_are_continued_until_none_improves(monkeypatch):
+    walker = WalkerParameters.from_yaml()
+    gaits = [one for one in GaitLibrary(walker).gaits() if one.request.spring_mode is SpringMode.NONE]
+    table = {
+        (index, SpringMode.NONE): gait for index, gait in enumerate(sorted(gaits, key=lambda g: g.speed))
+    }
+    third = table[2, SpringMode.NONE]
+    trajectory = third.refined.trajectory
+    better = replace(
+        third, refined=replace(third.refined, trajectory=replace(trajectory, torques=trajectory.torques / 2))
+    )
+    asked = []
+
+    def submit(_, job):
+        asked.append((job.gait.request, [seed.request for seed in job.seeds]))
+        future = Future()
+        future.set_result(Outcome(better if job.gait is third else job.gait, job.gait.report))
+        return future
+
+    builder = table_builder._Builder(
+        walker, {key: gait.request for key, gait in table.items()}, [], SimpleNamespace(submit=submit), None
+    )
+    builder.table = dict(table)
+    builder._continue_refinements()
+    assert builder.table == table | {(2, SpringMode.NONE): better}
+    requests = [gait.request for gait in table.values()]
+    assert [request for request, _ in asked[:7]] == requests
+    assert asked[7:] == [(requests[1], [requests[2]]), (requests[3], [requests[2]])]

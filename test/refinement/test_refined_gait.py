@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from walk_optimizer import refinement
 from walk_optimizer.contact.schedule import single_impact
-from walk_optimizer.gait import Gait, RefinedGait
+from walk_optimizer.gait import Certificate, CertificateEntry, Gait, RefinedGait
 from walk_optimizer.mesh_adaptation import _MOST_PARTS, MeshErrors, resampled
+from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refinement import RefinedSolves, refine
 from walk_optimizer.replay import replay_step
+from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.transcription.mesh import even_mesh
@@ -37,6 +40,27 @@ def test_a_mesh_twice_as_fine_changes_its_effort_by_less_than_a_thousandth(
     start = resampled(solution.trajectory, solution.spring, solution.mesh, finer)
     again = RefinedSolves(gait.request, gait.walker, session).solved(finer, start)
     assert again.effort == pytest.approx(solution.effort, rel=1e-3)
+
+
+def test_where_accurate_intervals_add_up_to_too_much_the_mesh_gets_finer(
+    gait: Gait, session: SolveSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solution = refine(gait, session)
+    assert solution.met
+    judged: list[int] = []
+
+    def too_strict_at_first(walker: WalkerParameters, request: GaitRequest, bare: RefinedGait) -> Certificate:
+        judged.append(bare.trajectory.intervals)
+        if len(judged) == 1:
+            return Certificate((CertificateEntry("stance_height", 1.02e-6, "m", 1e-6),))
+        return certify_refined(walker, request, bare)
+
+    monkeypatch.setattr(refinement, "certify_refined", too_strict_at_first)
+    found = RefinedSolves(gait.request, gait.walker, session).certified(solution)
+    assert found is not None
+    assert found.certificate.certified
+    assert judged == [solution.mesh.intervals, found.trajectory.intervals]
+    assert judged[0] < judged[1] <= 2 * judged[0]
 
 
 @pytest.mark.parametrize("error", [np.inf, np.nan, 1.0])
