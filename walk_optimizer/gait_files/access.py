@@ -1,12 +1,13 @@
 """Careful reading and writing of small files: no links, no devices, no half-written file."""
 
 import contextlib
+import errno
 import os
 import stat
 import tempfile
 from pathlib import Path
 
-from walk_optimizer.errors import GaitFileError, GaitNotWritableError
+from walk_optimizer.errors import GaitFileError, GaitNotWritableError, shortened
 from walk_optimizer.resources import sync_directory
 
 
@@ -31,7 +32,8 @@ def read_limited(path: Path, largest: int) -> bytes:
                 raise GaitFileError(f"{path}: {status.st_size} bytes, a gait file has at most {largest}")
             return stream.read(largest)
     except OSError as error:
-        if path.is_symlink():
+        # What O_NOFOLLOW makes of a link; to ask the path needs the right to enter its folder.
+        if error.errno == errno.ELOOP:
             raise GaitFileError(f"{path}: a symbolic link, which is not followed") from error
         raise GaitFileError(f"{path}: can't be read: {error.strerror}") from error
 
@@ -72,9 +74,11 @@ def writable_folder(folder: Path, create: bool) -> None:
     Raises:
         GaitNotWritableError: the folder is missing, a link, no folder, or not writable; the message names it.
     """
-    if folder.is_symlink():
-        raise GaitNotWritableError(f"{folder}: the folder is a symbolic link, which is not written through")
     try:
+        if folder.is_symlink():
+            raise GaitNotWritableError(
+                f"{folder}: the folder is a symbolic link, which is not written through"
+            )
         if create:
             folder.mkdir(parents=True, exist_ok=True)
         if not folder.is_dir():
@@ -90,13 +94,19 @@ def writable_target(path: Path) -> None:
     """Make sure, before any work, that a file can be put where a user wants it.
 
     Raises:
-        GaitFileError: the folder is missing or not writable, or the path is a folder.
+        GaitFileError: the folder is missing, not writable or can't be looked into, or the path is a folder.
     """
-    if path.is_dir():
-        raise GaitFileError(f"{path}: a folder, expected a file name")
-    if not path.absolute().parent.is_dir():
-        raise GaitFileError(f"{path}: the folder {path.absolute().parent} is missing")
-    if not os.access(path if path.exists() else path.absolute().parent, os.W_OK):
+    folder = path.absolute().parent
+    try:
+        if path.is_dir():
+            raise GaitFileError(f"{path}: a folder, expected a file name")
+        if not folder.is_dir():
+            raise GaitFileError(f"{path}: the folder {folder} is missing")
+        target = path if path.exists() else folder
+    except OSError as error:
+        place = shortened(str(path))
+        raise GaitFileError(f"{place}: can't be written: {error.strerror}; name another file") from error
+    if not os.access(target, os.W_OK):
         raise GaitFileError(f"{path}: not writable")
 
 
