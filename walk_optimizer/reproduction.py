@@ -15,7 +15,7 @@ from walk_optimizer.gait_files.access import write_text
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.report_table import TABLE_I
-from walk_optimizer.request import GaitRequest, gait_table_settings
+from walk_optimizer.request import KMH_PER_MS, GaitRequest, gait_table_settings
 from walk_optimizer.transcription import layout
 from walk_optimizer.transcription.problems import complementarity_problem
 
@@ -82,7 +82,7 @@ def sparsity(walker: WalkerParameters, points: int) -> NDArray[np.bool_]:
 def count_dents(gait: Gait) -> int:
     """Return how often the swing knee bends and stretches again by a visible angle."""
     knee = np.degrees(gait.trajectory.q[draw.KNEE_ROWS[1]])
-    dents, bending, extreme = 0, True, knee[0]
+    dents, bending, extreme = 0, False, knee[0]
     for angle in knee:
         extreme = min(extreme, angle) if bending else max(extreme, angle)
         if bending and angle > extreme + _DENT:
@@ -90,6 +90,22 @@ def count_dents(gait: Gait) -> int:
         elif not bending and angle < extreme - _DENT:
             bending, extreme = True, angle
     return dents
+
+
+def rotation(gaits: Sequence[Gait], rows: list[int]) -> str:
+    """Return how far a joint turns, in words; the largest angle need not be that of the fastest gait.
+
+    Args:
+        gaits: From slow to fast.
+        rows: Of the joint's angle in q, of both legs.
+    """
+    ranges = [_range(gait, rows) for gait in gaits]
+    largest = int(np.argmax(ranges))
+    growth = "grows" if bool(np.all(np.diff(ranges) > 0)) else "does not always grow"
+    return (
+        f"{growth} with speed: {ranges[0]:.0f}° at the slowest, {ranges[-1]:.0f}° at the fastest, at most "
+        f"{ranges[largest]:.0f}° ({gaits[largest].request.speed * KMH_PER_MS:.2f} km/h)"
+    )
 
 
 def _page(gaits: ModeGaits, close_up: Mapping[SpringMode, Gait], walker: WalkerParameters, table: str) -> str:
@@ -144,12 +160,10 @@ def _about_sparsity(walker: WalkerParameters) -> str:
 
 def _about_angles(gaits: Sequence[Gait]) -> str:
     """Return how the rotation of the joints changes with speed."""
-    hip = [_range(gait, draw.HIP_ROWS) for gait in gaits]
-    knee = [_range(gait, draw.KNEE_ROWS) for gait in gaits]
     dents = ", ".join(str(count_dents(gait)) for gait in gaits)
     return (
-        f"The rotation of the hip {_growth(hip)} with speed, from {hip[0]:.0f}° to {hip[-1]:.0f}°, that of "
-        f"the knee {_growth(knee)}, from {knee[0]:.0f}° to {knee[-1]:.0f}°; in the report both grow. "
+        f"The rotation of the hip {rotation(gaits, draw.HIP_ROWS)}. That of the knee "
+        f"{rotation(gaits, draw.KNEE_ROWS)}. In the report both grow. "
         "The report sees two dents of the knee angle in the swing of slow gaits, which melt into one for "
         f"fast ones; ours have, from slow to fast, {dents} (counted where the knee stretches again by more "
         f"than {_DENT}°)."
@@ -189,8 +203,3 @@ def _about_torques(gaits: Mapping[SpringMode, Gait]) -> str:
 def _range(gait: Gait, rows: list[int]) -> float:
     """Return the range of an angle over the cycle in [degrees]."""
     return float(np.degrees(np.ptp(gait.trajectory.q[rows])))
-
-
-def _growth(values: Sequence[float]) -> str:
-    """Return whether values grow from each to the next."""
-    return "grows" if bool(np.all(np.diff(values) > 0)) else "does not always grow"

@@ -7,9 +7,10 @@ import pytest
 from cli.console import walk_optimizer
 from library.made_up_gait import all_modes, made_up_gait
 
+from walk_optimizer.figures.report_figures import HIP_ROWS
 from walk_optimizer.gait_files import gait_file_name, write_gait_file
 from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.reproduction import count_dents, sparsity
+from walk_optimizer.reproduction import count_dents, rotation, sparsity
 from walk_optimizer.request import gait_table_settings
 
 WALKER = WalkerParameters()
@@ -35,7 +36,7 @@ def test_page_and_figures_are_written(tmp_path, folder):
     for number in range(1, 6):
         assert f"(figure_{number}.png)" in page
         assert (output / f"figure_{number}.png").stat().st_size > 10_000
-    assert "The rotation of the hip grows with speed" in page
+    assert "The rotation of the hip grows with speed: " in page
     assert "from slow to fast, 1, 1, 1, 1, 1, 1, 1 (counted" in page
     assert "11 of 14 of our F% are at or below" in page
     assert "Agrees: knee springs also lower the largest torque at the hip" in page
@@ -73,3 +74,22 @@ def test_dents_are_counted_where_the_knee_stretches_again(bends, dents):
     depth = np.array([*bends, 0])[np.minimum(phase.astype(int), len(bends))]
     q[5] = np.pi - np.radians(depth) * np.sin(np.pi * (phase % 1)) ** 2
     assert count_dents(replace(gait, trajectory=replace(gait.trajectory, q=q))) == dents
+
+
+def test_a_knee_that_begins_its_swing_by_stretching_has_no_dent_there():
+    gait = made_up_gait(points=200)
+    q = gait.trajectory.q.copy()
+    # It leaves the ground bent by 10 degrees, stretches, and bends once by 60 degrees.
+    depth = np.interp(np.linspace(0, 1, 200), (0, 0.2, 0.6, 1), (10, 0, 60, 10))
+    q[5] = np.pi - np.radians(depth)
+    assert count_dents(replace(gait, trajectory=replace(gait.trajectory, q=q))) == 1
+
+
+def test_the_largest_rotation_is_told_with_its_speed_where_it_is_not_the_last():
+    gaits = [made_up_gait(speed=speed, points=200) for speed in gait_table_settings().table_speeds()]
+    turned = gaits[4].trajectory.q.copy()
+    turned[2, 0] += np.radians(40)
+    gaits[4] = replace(gaits[4], trajectory=replace(gaits[4].trajectory, q=turned))
+    hip = rotation(gaits, HIP_ROWS)
+    assert hip.startswith("does not always grow with speed: ")
+    assert hip.endswith("° (2.44 km/h)")
