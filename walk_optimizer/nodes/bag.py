@@ -19,7 +19,7 @@ from walk_optimizer.recording.errors import (
     NotRecordingError,
     RecordingError,
 )
-from walk_optimizer.recording.recorder import RecorderLog
+from walk_optimizer.recording.recording_thread import RecorderLog
 from walk_optimizer.recording.ros_messages import qos_profile, serialize, topic_info
 from walk_optimizer.recording.status import RecorderStatus
 

@@ -7,7 +7,6 @@ from walk_optimizer.nodes.remote_service import RemoteService
 from walk_optimizer.nodes.speed_commands import SpeedCommands
 from walk_optimizer.nodes.walk_commands import WalkCommands
 from walk_optimizer.phase_clock import Motion
-from walk_optimizer.recording.disk import free_bytes
 from walk_optimizer.recording.status import RecorderStatus
 
 _CHECKS = ("walk", "commands", "library", "timing", "recording")
@@ -119,12 +118,10 @@ class PublisherHealth:
 
 
 def _recording_values(status: RecorderStatus) -> dict[str, object]:
-    values: dict[str, object] = {
+    return {
         "directory": status.directory,
         "messages": status.messages,
         "dropped": status.dropped,
         "size_mb": status.size_bytes / _MEGABYTE,
+        "free_mb": status.free_bytes / _MEGABYTE,
     }
-    if status.directory.is_dir():
-        values["free_mb"] = free_bytes(status.directory) / _MEGABYTE
-    return values

@@ -88,7 +88,7 @@ class RecordingControl:
         self._thread.shutdown()
 
     async def _start(self, request: StartRecording.Request, response: StartRecording.Response) -> None:
-        directory = await self._record(named_folder(request.directory) if request.directory else None)
+        directory = await self._record(request.directory)
         response.directory = str(directory)
         response.message = f"recording to {directory}"
 
@@ -111,12 +111,15 @@ class RecordingControl:
             self._bag.error = error
             self._show()
 
-    async def _record(self, directory: Path | None = None) -> Path:
-        """Begin a bag and return its directory."""
-        parameters = self._node.parameters
-        directory = directory or new_bag_folder(parameters["recording_folder"])
-        settings = recorder_settings(parameters)
-        await self._done(lambda: self._bag.start(directory, settings, self._log))
+    async def _record(self, name: str = "") -> Path:
+        """Begin a bag, of this name if there is one, and return its directory."""
+        folder, settings = self._node.parameters["recording_folder"], recorder_settings(self._node.parameters)
+
+        def begin() -> Path:
+            directory = named_folder(name) if name else new_bag_folder(folder)
+            return self._bag.start(directory, settings, self._log).directory
+
+        directory = await self._done(begin)
         self._listen_to_others()
         self._show()
         self._stream.announce_again()

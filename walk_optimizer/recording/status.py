@@ -18,6 +18,7 @@ class RecorderStatus:
         queued: Messages that wait for the disk.
         dropped: Messages that were offered while it was recording, but are not in the bag and will not be.
         size_bytes: Size of the files on the disk in [byte].
+        free_bytes: Free space of the disk in [byte], as last measured; 0 before the start.
         error: Why the recording ended on its own; None if it did not.
     """
 
@@ -28,4 +29,5 @@ class RecorderStatus:
     queued: int
     dropped: int
     size_bytes: int
+    free_bytes: int
     error: RecordingError | None
