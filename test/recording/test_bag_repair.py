@@ -19,7 +19,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
 from mcap.records import Chunk, Header
 from mcap.writer import Writer
-from recording.samples import JOINTS, PERIOD_NS, START_NS, STORE, joint_state, number_of, write_bag
+from recording.samples import JOINTS, PERIOD_NS, START_NS, STORE, joint_state, number_of, string, write_bag
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
@@ -32,8 +32,14 @@ from walk_optimizer.recording import (
     read_messages,
     repair_bag,
 )
-from walk_optimizer.recording.errors import BagExistsError, CompressedBagError, NotABagError
+from walk_optimizer.recording.errors import (
+    BagExistsError,
+    CompressedBagError,
+    ForeignTopicError,
+    NotABagError,
+)
 from walk_optimizer.recording.framing import MAGIC
+from walk_optimizer.recording.playback import topic_names
 from walk_optimizer.recording.records import DamageKind
 
 COUNT = 300
@@ -427,6 +433,57 @@ def test_a_chunk_takes_no_more_memory_than_it_says(tmp_path, compression, compre
 def test_a_chunk_that_cannot_be_is_not_opened(tmp_path, compression, size, words):
     info = describe_bag(file_with_chunk(tmp_path / "walk.mcap", compression, b"abc", size))
     assert words in info.files[0].damage[0].reason
+
+
+def foreign_file(path: Path, *channels: tuple[str, str], attached: bool = False) -> Path:
+    """Write messages of several types and encodings on one topic, as other programs may."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("")
+        for time_ns, (type_name, encoding) in enumerate(channels):
+            schema = writer.register_schema(type_name, "ros2msg", b"string data")
+            writer.add_message(writer.register_channel("/t", encoding, schema), time_ns, string("a"), time_ns)
+        if attached:
+            writer.add_attachment(0, 0, "notes.txt", "text/plain", b"notes")
+            writer.add_metadata("notes", {"by": "hand"})
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("channels", "words"),
+    [
+        (
+            [("std_msgs/msg/String", "cdr"), ("std_msgs/msg/Float64", "cdr")],
+            "topic '/t' has 2 types, 'std_msgs/msg/String' and 'std_msgs/msg/Float64', allowed is one",
+        ),
+        ([("std_msgs/msg/String", "protobuf")], "topic '/t' is encoded as 'protobuf', allowed is cdr"),
+    ],
+)
+def test_topics_that_are_none_of_ros_are_not_repaired_nor_played(tmp_path, channels, words):
+    path = foreign_file(tmp_path / "foreign.mcap", *channels)
+    with pytest.raises(ForeignTopicError, match=words):
+        repair_bag(path)
+    with pytest.raises(ForeignTopicError, match=words):
+        topic_names(describe_bag(path), None)
+    types = ", ".join(name for name, _ in channels)
+    assert f"  /t  {types}  {len(channels)}" in format_bag(describe_bag(path))
+    assert [path.name for path in tmp_path.iterdir()] == ["foreign.mcap"]
+
+
+def test_what_a_repaired_bag_cannot_hold_is_told(tmp_path):
+    report = repair_bag(foreign_file(tmp_path / "a.mcap", ("std_msgs/msg/String", "cdr"), attached=True))
+    assert report.recovered_messages == 1
+    assert str(report).endswith("; 2 attachments and metadata of other programs left out")
+    assert "left out" not in str(repair_bag(write_bag(tmp_path / "walk", range(3)))).partition("lost")[2]
+
+
+def test_a_repaired_bag_keeps_its_distribution(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROS_DISTRO", "humble")
+    bag = write_bag(tmp_path / "walk", range(10))
+    monkeypatch.setenv("ROS_DISTRO", "jazzy")
+    for source in (bag, bag / "walk_0.mcap"):
+        assert describe_bag(repair_bag(source).destination).ros_distro == "humble"
 
 
 def test_description_for_people(tmp_path):

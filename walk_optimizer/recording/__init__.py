@@ -4,8 +4,9 @@ Nothing here needs ROS but `walk_optimizer.recording.ros_messages`, which is the
 from this page.
 """
 
+from walk_optimizer.recording.bag_text import format_bag
 from walk_optimizer.recording.bag_writer import BagWriter
-from walk_optimizer.recording.info import BagInfo, describe_bag, format_bag
+from walk_optimizer.recording.info import BagInfo, describe_bag
 from walk_optimizer.recording.reading import BagMessage, read_messages
 from walk_optimizer.recording.recorder import Recorder
 from walk_optimizer.recording.repair import RepairReport, repair_bag

@@ -38,6 +38,7 @@ class BagWriter:
         settings: RecorderSettings | None = None,
         custom_data: Mapping[str, str] | None = None,
         topics: Iterable[TopicInfo] = (),
+        ros_distro: str = "",
     ) -> None:
         """Create the directory, its first file, and its metadata.yaml.
 
@@ -46,6 +47,7 @@ class BagWriter:
             settings: How to write it.
             custom_data: Free texts for metadata.yaml.
             topics: Topics to announce from the start; others may follow.
+            ros_distro: ROS distribution that recorded the messages; that of the environment when empty.
 
         Raises:
             BagExistsError: If the directory is already there.
@@ -55,7 +57,7 @@ class BagWriter:
         self.directory = directory
         self.settings = settings or RecorderSettings()
         self.custom_data = dict(custom_data or {})
-        self._ros_distro = os.environ.get("ROS_DISTRO") or DEFAULT_ROS_DISTRO
+        self._ros_distro = ros_distro or os.environ.get("ROS_DISTRO") or DEFAULT_ROS_DISTRO
         self._topics = {topic.name: topic for topic in topics}
         self._finished: list[FileEntry] = []
         self._finished_bytes = 0

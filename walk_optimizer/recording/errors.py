@@ -49,3 +49,7 @@ class NotABagError(RecordingError):
 
 class CompressedBagError(NotABagError):
     """The bag was compressed by rosbag2 in a way that its .mcap files do not show."""
+
+
+class ForeignTopicError(RecordingError):
+    """A topic of a file that was not written by ROS 2, and that can't be repaired or played as one of it."""

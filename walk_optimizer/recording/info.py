@@ -1,10 +1,11 @@
 """What is in a bag, and whether it is whole, without ROS."""
 
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 
+from walk_optimizer.errors import quoted
 from walk_optimizer.recording.bag_directory import (
     Description,
     bag_files,
@@ -12,10 +13,13 @@ from walk_optimizer.recording.bag_directory import (
     read_description,
     require_readable,
 )
+from walk_optimizer.recording.errors import ForeignTopicError
 from walk_optimizer.recording.metadata import FileEntry
 from walk_optimizer.recording.records import Damage, DamageKind
 from walk_optimizer.recording.scan import FileScan
-from walk_optimizer.recording.topics import NANOSECONDS_PER_SECOND, TopicInfo
+from walk_optimizer.recording.topics import SERIALIZATION_FORMAT, TopicInfo
+
+_OTHER_TOOLS = "the program that wrote the file, or the `mcap` command line tool, handles it"
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,7 @@ class FileInfo:
         compressions: Compressions of the chunks; empty text for none.
         damage: What cannot be trusted, in the order of the file.
         lost_messages: Messages known to be lost to the damage; there may be more.
+        foreign_records: Attachments and metadata of other programs.
     """
 
     path: Path
@@ -41,6 +46,7 @@ class FileInfo:
     compressions: tuple[str, ...]
     damage: tuple[Damage, ...]
     lost_messages: int
+    foreign_records: int
 
     @property
     def is_whole(self) -> bool:
@@ -78,8 +84,15 @@ class BagInfo:
 
     @property
     def topics(self) -> tuple[TopicInfo, ...]:
-        """Topics of all files, each once, in the order met."""
-        return tuple({topic.name: topic for file in self.files for topic in file.topics}.values())
+        """Topics of all files, in the order met; more than once only where types differ."""
+        topics = (topic for file in self.files for topic in file.topics)
+        return tuple({(topic.name, topic.type_name, topic.type_hash): topic for topic in topics}.values())
+
+    @property
+    def types(self) -> dict[str, tuple[str, ...]]:
+        """Message types by topic; a topic of ROS has one."""
+        names = dict.fromkeys(topic.name for topic in self.topics)
+        return {name: tuple(topic.type_name for topic in self.topics if topic.name == name) for name in names}
 
     @property
     def counts(self) -> Counter[str]:
@@ -95,6 +108,11 @@ class BagInfo:
     def lost_messages(self) -> int:
         """Messages known to be lost to damage; there may be more."""
         return sum(file.lost_messages for file in self.files)
+
+    @property
+    def foreign_records(self) -> int:
+        """Attachments and metadata of other programs."""
+        return sum(file.foreign_records for file in self.files)
 
     @property
     def size_bytes(self) -> int:
@@ -149,27 +167,6 @@ def describe_bag(path: Path) -> BagInfo:
     )
 
 
-def format_bag(info: BagInfo) -> str:
-    """Return the description of a bag as a text for people."""
-    lines = [
-        f"Bag:         {info.path}",
-        f"State:       {_state(info)}",
-        f"Size:        {info.size_bytes / 1e6:.3f} MB in {len(info.files)} file(s)",
-        f"Compression: {', '.join(name or 'none' for name in info.compressions) or 'none'}",
-        f"Distro:      {info.ros_distro or 'unknown'}",
-        f"Start:       {_date(info.start_time_ns)}",
-        f"Duration:    {info.duration_ns / NANOSECONDS_PER_SECOND:.6f} s",
-        f"Messages:    {info.message_count}",
-        "Topics:",
-    ]
-    counts = info.counts
-    lines += [f"  {topic.name}  {topic.type_name}  {counts[topic.name]}" for topic in info.topics]
-    lines += [f"{key}: {value}" for key, value in info.custom_data]
-    for file in info.files:
-        lines += [f"  {file.path.name}, byte {item.offset}: {item.reason}" for item in file.damage]
-    return "\n".join(lines)
-
-
 def _describe_file(scan: FileScan) -> FileInfo:
     path = scan.path
     counts: Counter[str] = Counter()
@@ -189,21 +186,25 @@ def _describe_file(scan: FileScan) -> FileInfo:
         compressions=tuple(scan.compressions),
         damage=tuple(scan.damage),
         lost_messages=scan.lost_messages,
+        foreign_records=scan.foreign_records,
     )
 
 
-def _state(info: BagInfo) -> str:
-    if info.is_whole:
-        return "whole, all checksums right"
-    found = [f"{info.count_damage(kind)} x {kind.value}" for kind in DamageKind if info.count_damage(kind)]
-    saved = "repair writes a whole bag from what is left"
-    rest = saved if info.message_count else "nothing was recorded that could be saved"
-    return f"damaged ({', '.join(found)}); {rest}"
+def require_ros_topics(info: BagInfo, names: Collection[str]) -> None:
+    """Refuse topics that only other programs than ROS 2 write.
 
-
-def _date(time_ns: int | None) -> str:
-    if time_ns is None:
-        return "no messages"
-    seconds = time_ns / NANOSECONDS_PER_SECOND
-    date = datetime.fromtimestamp(seconds, tz=UTC).isoformat(sep=" ")
-    return f"{date} ({time_ns} ns)"
+    Raises:
+        ForeignTopicError: says what is wrong with them.
+    """
+    for topic in info.topics:
+        if topic.name in names and topic.serialization_format != SERIALIZATION_FORMAT:
+            raise ForeignTopicError(
+                f"topic {quoted(topic.name)} is encoded as {quoted(topic.serialization_format)}, "
+                f"allowed is {SERIALIZATION_FORMAT}, as ROS 2 does; {_OTHER_TOOLS}"
+            )
+    for name, types in info.types.items():
+        if name in names and len(types) > 1:
+            raise ForeignTopicError(
+                f"topic {quoted(name)} has {len(types)} types, {' and '.join(map(quoted, types))}, "
+                f"allowed is one, as in ROS 2; {_OTHER_TOOLS}"
+            )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from walk_optimizer.errors import InvalidRequestError, quoted
-from walk_optimizer.recording.info import BagInfo
+from walk_optimizer.recording.info import BagInfo, require_ros_topics
 from walk_optimizer.recording.reading import BagMessage, read_messages
 
 NANOSECONDS = 1e9
@@ -60,7 +60,7 @@ def require_topics(info: BagInfo, topics: Collection[str]) -> None:
     Raises:
         InvalidRequestError: names them, and those that there are.
     """
-    known = [topic.name for topic in info.topics]
+    known = list(info.types)
     unknown = sorted(set(topics) - set(known))
     if unknown:
         raise InvalidRequestError(f"the bag has no topic {', '.join(unknown)}; it has {', '.join(known)}")
@@ -79,10 +79,12 @@ def topic_names(
     Raises:
         InvalidRequestError: the bag lacks a topic, has no message to play, a remap is none, or two topics
             would get one name.
+        ForeignTopicError: a topic is none of ROS 2.
     """
     require_topics(info, topics or ())
-    wanted = [topic.name for topic in info.topics if topics is None or topic.name in topics]
+    wanted = [name for name in info.types if topics is None or name in topics]
     _require_messages(info, wanted)
+    require_ros_topics(info, wanted)
     names = {name: name for name in wanted}
     for remap in remaps:
         name, mark, other = remap.partition(":=")

@@ -84,12 +84,14 @@ class Block:
         records: What the chunk held, or the record.
         compression: Compression of the chunk, empty for none; None for a record outside of chunks.
         indexed_messages: Messages that an index record lists for the chunk before it.
+        is_attachment: Whether the record is a file that was put into this one.
     """
 
     offset: int
     records: tuple[McapRecord, ...]
     compression: str | None = None
     indexed_messages: int = 0
+    is_attachment: bool = False
 
 
 class UnreadableError(Exception):
@@ -116,7 +118,7 @@ def read_block(data: mmap, offset: int, chunked: bool) -> tuple[Block, int]:
     if opcode == Opcode.MESSAGE_INDEX:
         return Block(offset, (), indexed_messages=_count_index(body)), end
     if opcode == Opcode.ATTACHMENT:
-        return Block(offset, ()), end
+        return Block(offset, (), is_attachment=True), end
     if opcode == Opcode.MESSAGE and not chunked:
         return Block(offset, (_parse_message(body),)), end
     if opcode not in _PARSERS:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from walk_optimizer.recording.bag_writer import BagWriter
 from walk_optimizer.recording.errors import RecordingError
-from walk_optimizer.recording.info import BagInfo, describe_bag
+from walk_optimizer.recording.info import BagInfo, describe_bag, require_ros_topics
 from walk_optimizer.recording.records import DamageKind
 from walk_optimizer.recording.scan import FileScan
 from walk_optimizer.recording.settings import Compression, RecorderSettings
@@ -30,6 +30,7 @@ class RepairReport:
             do not decompress.
         damaged_records: Places where records made no sense, and reading went on at the next chunk.
         cut_off: Whether the recording was broken off.
+        foreign_records: Attachments and metadata of other programs; they are not in the new bag.
     """
 
     source: Path
@@ -39,14 +40,17 @@ class RepairReport:
     damaged_chunks: int
     damaged_records: int
     cut_off: bool
+    foreign_records: int
 
     def __str__(self) -> str:
         """Return the report as a sentence for people."""
         end = "cut off" if self.cut_off else "not cut off"
+        foreign = f"; {self.foreign_records} attachments and metadata of other programs left out"
         return (
             f"{self.recovered_messages} messages recovered from {self.source} to {self.destination};"
             f" {self.damaged_chunks} damaged chunks and {self.damaged_records} damaged records left"
             f" out, at least {self.lost_messages} messages lost with them; the bag was {end}"
+            f"{foreign * bool(self.foreign_records)}"
         )
 
 
@@ -62,15 +66,17 @@ def repair_bag(path: Path, destination: Path | None = None) -> RepairReport:
 
     Raises:
         NotABagError: If the path is no bag that can be read.
+        ForeignTopicError: If a topic is none of ROS 2.
         BagExistsError: If the destination is already there.
         RecordingError: If the destination cannot be written; nothing is left of it then.
     """
     info = describe_bag(path)
+    require_ros_topics(info, info.types)
     # Without `..`, whose neighbours are inside of the folder that it leads out of.
     source = path.resolve()
     target = destination or _beside(source)
     custom_data = {**dict(info.custom_data), REPAIRED_FROM_KEY: source.name}
-    writer = BagWriter(target, _settings(info), custom_data, info.topics)
+    writer = BagWriter(target, _settings(info), custom_data, info.topics, info.ros_distro)
     try:
         _copy(info, writer)
         writer.close()
@@ -88,6 +94,7 @@ def repair_bag(path: Path, destination: Path | None = None) -> RepairReport:
         damaged_chunks=info.count_damage(DamageKind.CHUNK),
         damaged_records=info.count_damage(DamageKind.RECORD),
         cut_off=info.is_cut_off,
+        foreign_records=info.foreign_records,
     )
 
 

@@ -46,6 +46,7 @@ class FileScan:
         chunks: Chunks that were read whole.
         lost_messages: Messages of damaged chunks, as far as an index still counts them, and
             messages whose topic was lost.
+        foreign_records: Attachments and metadata of other programs.
         bag_metadata: The latest description of the bag that the file holds, in YAML.
     """
 
@@ -55,6 +56,7 @@ class FileScan:
     compressions: list[str] = field(default_factory=list)
     chunks: int = 0
     lost_messages: int = 0
+    foreign_records: int = 0
     bag_metadata: str | None = None
     _schemas: dict[int, Schema] = field(default_factory=dict)
 
@@ -121,6 +123,7 @@ class FileScan:
             self.chunks += 1
             if block.compression not in self.compressions:
                 self.compressions.append(block.compression)
+        self.foreign_records += block.is_attachment
         for record in block.records:
             if not isinstance(record, Message):
                 self._take_description(record)
@@ -134,7 +137,9 @@ class FileScan:
             self._schemas[record.id] = record
         elif isinstance(record, Channel):
             self.topics[record.id] = self._topic(record)
-        elif isinstance(record, Metadata) and record.name == METADATA_RECORD:
+        elif isinstance(record, Metadata) and record.name != METADATA_RECORD:
+            self.foreign_records += 1
+        elif isinstance(record, Metadata):
             self.bag_metadata = record.metadata.get(METADATA_KEY, self.bag_metadata)
 
     def _topic(self, channel: Channel) -> TopicInfo:

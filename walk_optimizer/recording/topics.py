@@ -10,6 +10,9 @@ from walk_optimizer.recording.errors import MessageError, TopicError
 
 NANOSECONDS_PER_SECOND = 1_000_000_000
 
+SERIALIZATION_FORMAT = "cdr"
+"""Encoding of the messages of ROS 2."""
+
 INFINITE_NS = 9_223_372_036_854_775_807
 """The rmw constant for an infinite duration, in [ns]."""
 
@@ -105,7 +108,7 @@ class TopicInfo:
     type_hash: str
     qos: tuple[QosProfile, ...] = (QosProfile(),)
     definition_encoding: str = "ros2msg"
-    serialization_format: str = "cdr"
+    serialization_format: str = SERIALIZATION_FORMAT
 
 
 def qos_to_yaml(profiles: tuple[QosProfile, ...]) -> str:
