@@ -141,8 +141,12 @@ def test_a_path_keeps_a_torque_limit_by_way_of_slower_gaits(table, stand, gaits)
 
 
 def test_what_leads_nowhere_says_what_to_do(table, stand, gaits):
-    with pytest.raises(GaitNotFoundError, match="solve one with plan_transition"):
-        table.path(stand, gaits[SPRUNG][-1], (), torque_limit=1.0)
+    fastest = gaits[SPRUNG][-1]
+    for limit, within in ((1.0, " within 1 N m"), ((1.0, 50.0), " within 1 N m at the hips and 50 N m at")):
+        with pytest.raises(GaitNotFoundError, match=f"{pace_name(fastest)}{within}.*; solve one with plan_"):
+            table.path(stand, fastest, (), torque_limit=limit)
+    with pytest.raises(GaitNotFoundError, match=f"from stand to {pace_name(stand)}; solve one with plan_"):
+        table.path(stand, stand)
 
 
 def test_a_stored_transition_is_the_same_when_it_is_read(table, solved, walker):

@@ -18,7 +18,7 @@ from walk_optimizer.transition.files import TransitionName, read_transition_file
 from walk_optimizer.transition.paces import Pace, pace_name
 from walk_optimizer.transition.settings import transition_settings
 from walk_optimizer.transition.standing import Standing, standing_pose
-from walk_optimizer.transition.torque_limit import TorqueLimit, exceeds
+from walk_optimizer.transition.torque_limit import TorqueLimit, exceeds, limit_in_words
 from walk_optimizer.transition.transition import Transition
 
 
@@ -129,12 +129,17 @@ class TransitionTable:
             torque_limit: As for `find`.
 
         Raises:
-            GaitNotFoundError: no such transitions are solved; the message names both paces.
+            GaitNotFoundError: no such transitions are solved; the message names both paces and the limit.
         """
         paces = {pace_name(pace): pace for pace in (*between, source, target)}
         unusable: set[tuple[str, str]] = set()
         while True:
             names = self._fewest_steps(pace_name(source), pace_name(target), set(paces), unusable)
+            if not names:
+                raise GaitNotFoundError(
+                    f"no solved transitions lead from {pace_name(source)} to {pace_name(target)}"
+                    f"{limit_in_words(torque_limit)}; solve one with plan_transition"
+                )
             found = []
             for pair in pairwise(names):
                 transition = self.find(paces[pair[0]], paces[pair[1]], torque_limit)
@@ -148,7 +153,10 @@ class TransitionTable:
     def _fewest_steps(
         self, source: str, target: str, allowed: set[str], unusable: set[tuple[str, str]]
     ) -> list[str]:
-        """Return the names of the paces on the way (Dijkstra's algorithm, the steps being lengths)."""
+        """Return the names of the paces on the way (Dijkstra's algorithm, the steps being lengths).
+
+        There are none where there is no way.
+        """
         order = count()
         waiting = [(0, next(order), [source])]
         seen: set[str] = set()
@@ -163,6 +171,4 @@ class TransitionTable:
             for name in self._files:
                 if name.source == here and name.target in allowed and (here, name.target) not in unusable:
                     heapq.heappush(waiting, (steps + name.steps, next(order), [*names, name.target]))
-        raise GaitNotFoundError(
-            f"no solved transitions lead from {source} to {target}; solve one with plan_transition"
-        )
+        return []
