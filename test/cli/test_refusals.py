@@ -93,6 +93,15 @@ def test_bad_input_of_solve_is_refused_in_one_line(no_work, capsys, arguments, m
             )
         ],
         (["library", "verify", "--folder", "/nowhere"], "/nowhere: no gait files"),
+        (
+            ["urdf", "--equilibrium", "3"],
+            "--equilibrium is that of springs: give their --stiffness too, or leave it out",
+        ),
+        (["demo", "--seconds", "0"], "seconds is '0', allowed are finite numbers above 0, in s"),
+        *[
+            ([verb, "--output", __file__], f"{__file__}: the folder is a file; name another")
+            for verb in ("reproduce", "demo")
+        ],
         (["library", "build", "--output", "/nowhere"], "/nowhere: the folder is missing"),
         (["library", "build", "--jobs", "0"], "jobs is '0', allowed are whole numbers of at least 1"),
         (["library", "build", "--jobs", "two"], "jobs is 'two', allowed are whole numbers of at least 1"),

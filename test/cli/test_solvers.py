@@ -26,7 +26,7 @@ def no_work(monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--solver", "knitro"], "unknown back_end 'knitro'; known are ipopt (interior point"),
+        (["--solver", "knitro"], "unknown solver 'knitro'; allowed are ipopt, uno, fatrop, snopt"),
         (["--formulation", "report", "--solver", "uno"], "--formulation report is IPOPT's"),
         (["--formulation", "report", "--save"], "leave --solver, --save and --export out"),
     ],

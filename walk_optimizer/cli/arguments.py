@@ -130,13 +130,32 @@ def _whole(text: str) -> int | None:
         return None
 
 
-def positive_seconds(text: str) -> float:
+def positive_seconds(text: str, name: str) -> float:
     """Return a duration in [s].
+
+    Args:
+        text: What was typed.
+        name: Of the duration, for messages.
 
     Raises:
         InvalidRequestError: the text is no finite number above 0.
     """
-    return parse_number(text, "time limit", "in s", above=0.0)
+    return parse_number(text, name, "in s", above=0.0)
+
+
+def output_folder(folder: Path) -> Path:
+    """Return a folder for what a command writes; it is made where it is missing.
+
+    Raises:
+        GaitFileError: a file has its name, or it can't be written into.
+    """
+    from walk_optimizer.gait_files.access import writable_folder
+    from walk_optimizer.library import existing_folder
+
+    if folder.exists():
+        existing_folder(folder)
+    writable_folder(folder, create=True)
+    return folder
 
 
 def parse_number(text: str, name: str, unit: str, above: float = -math.inf) -> float:

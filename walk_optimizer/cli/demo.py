@@ -11,7 +11,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from walk_optimizer.cli.arguments import Subparsers, add_verb, positive_seconds
+from walk_optimizer.cli.arguments import Subparsers, add_verb, output_folder, positive_seconds
 from walk_optimizer.errors import SolveFailedError
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest, parse_speed
@@ -58,11 +58,10 @@ def add_parser(verbs: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the demonstration; 0 when everything agreed and everybody left cleanly."""
     request = GaitRequest.for_speed(parse_speed(args.speed), args.spring, args.points)
-    seconds = positive_seconds(args.seconds)
+    seconds = positive_seconds(args.seconds, "seconds")
     output = args.output or Path("log") / f"demo_{datetime.now().astimezone():%Y_%m_%d-%H_%M_%S}"
-    output.mkdir(parents=True, exist_ok=True)
     with _terminated_as_interrupted():
-        return _Demo(request, seconds, output).run()
+        return _Demo(request, seconds, output_folder(output)).run()
 
 
 class _Demo:

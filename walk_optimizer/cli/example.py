@@ -36,7 +36,7 @@ def add_parser(verbs: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Solve, print, draw."""
-    time_limit = None if args.time_limit is None else positive_seconds(args.time_limit)
+    time_limit = None if args.time_limit is None else positive_seconds(args.time_limit, "time limit")
 
     from walk_optimizer.cli.text import certificate_text
     from walk_optimizer.examples.catalogue import solve_example

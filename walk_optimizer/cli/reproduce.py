@@ -3,7 +3,14 @@
 import argparse
 from pathlib import Path
 
-from walk_optimizer.cli.arguments import Subparsers, add_library, add_verb, add_walker, walker_from
+from walk_optimizer.cli.arguments import (
+    Subparsers,
+    add_library,
+    add_verb,
+    add_walker,
+    output_folder,
+    walker_from,
+)
 
 _TEXT = """\
 build the report's table and figures again, from the gaits of the library
@@ -27,13 +34,11 @@ def add_parser(verbs: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw and write."""
     from walk_optimizer.cli.table_text import table_text
-    from walk_optimizer.gait_files.access import writable_folder
     from walk_optimizer.library import GaitLibrary
     from walk_optimizer.reproduction import reproduce
 
     library = GaitLibrary(walker_from(args), args.library)
-    writable_folder(args.output, create=True)
     table = table_text(library)
-    page = reproduce(library, args.output, table)
+    page = reproduce(library, output_folder(args.output), table)
     print(f"{table}\n\nfigures and what to see in them: {page}")
     return 0

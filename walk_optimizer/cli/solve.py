@@ -15,7 +15,7 @@ from walk_optimizer.cli.arguments import (
     request_from,
     walker_from,
 )
-from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.errors import InvalidRequestError, quoted
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.registry import BACK_ENDS, back_end
@@ -70,10 +70,13 @@ def solver_settings_from(args: argparse.Namespace) -> "SolverSettings":
     """Return the settings with the chosen back end.
 
     Raises:
-        InvalidRequestError: the report's formulation is asked for together with what it can't have.
-        ConfigurationError: there is no such back end.
+        InvalidRequestError: there is no such back end, or the report's formulation is asked for together
+            with what it can't have.
         MissingDependencyError: its library is missing.
     """
+    if args.solver not in (None, *BACK_ENDS):
+        allowed = ", ".join(BACK_ENDS)
+        raise InvalidRequestError(f"unknown solver {quoted(args.solver)}; allowed are {allowed}")
     if args.formulation == "report" and (args.solver not in (None, "ipopt") or args.save or args.export):
         raise InvalidRequestError(
             "--formulation report is IPOPT's and shows residuals: leave --solver, --save and --export out"
@@ -111,7 +114,7 @@ def _try_report(
 def run(args: argparse.Namespace) -> int:
     """Solve, print, store."""
     request, walker = request_from(args), walker_from(args)
-    time_limit = None if args.time_limit is None else positive_seconds(args.time_limit)
+    time_limit = None if args.time_limit is None else positive_seconds(args.time_limit, "time limit")
     settings = solver_settings_from(args)
 
     from walk_optimizer.cli.gaits import solve

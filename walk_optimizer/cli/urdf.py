@@ -28,11 +28,9 @@ def add_parser(verbs: Subparsers) -> None:
     """Add the verb."""
     parser = add_verb(verbs, "urdf", _TEXT, _EPILOG)
     add_walker(parser)
+    parser.add_argument("--stiffness", metavar="K", help="of both knees in N m/rad (default: no springs)")
     parser.add_argument(
-        "--stiffness", default="0", metavar="K", help="of both knees in N m/rad (default: no springs)"
-    )
-    parser.add_argument(
-        "--equilibrium", default="pi", metavar="Q_EQ", help="of both knees in rad (default: %(default)s)"
+        "--equilibrium", metavar="Q_EQ", help="of both knees in rad, with --stiffness (default: pi)"
     )
     parser.add_argument("--output", type=Path, metavar="FILE", help="default: standard output")
     parser.set_defaults(run=run)
@@ -60,16 +58,20 @@ def _spring(args: argparse.Namespace, walker: WalkerParameters) -> KneeSpring:
     """Return the knee springs that were asked for.
 
     Raises:
-        InvalidRequestError: no walker has such springs.
+        InvalidRequestError: no walker has such springs, or only their equilibrium is given.
     """
-    stiffness = _number(args.stiffness)
-    equilibrium = math.pi if args.equilibrium == "pi" else _number(args.equilibrium)
+    stiffness = 0.0 if args.stiffness is None else _number(args.stiffness)
+    equilibrium = math.pi if args.equilibrium in (None, "pi") else _number(args.equilibrium)
     if not 0 <= stiffness <= walker.stiffness_limit:
         raise InvalidRequestError(
             f"stiffness is {args.stiffness} N m/rad, allowed is 0 to {walker.stiffness_limit:g} N m/rad"
         )
     if not 0 <= equilibrium <= math.pi:
         raise InvalidRequestError(f"equilibrium is {args.equilibrium} rad, allowed is 0 to pi")
+    if args.equilibrium is not None and args.stiffness is None:
+        raise InvalidRequestError(
+            "--equilibrium is that of springs: give their --stiffness too, or leave it out"
+        )
     return KneeSpring(stiffness, equilibrium)
 
 
