@@ -69,6 +69,13 @@ class PhaseClock:
         self._progress = 1.0
         self._lock = threading.Lock()
 
+    def restart(self) -> None:
+        """Begin a new walk with the next time that the clock shows; an emergency stop stays in force."""
+        with self._lock:
+            self.holds, self._jumped, self._clock = 0, False, None
+            if self._motion is not Motion.EMERGENCY_STOP:
+                self._motion, self._progress = Motion.RUNNING, 1.0
+
     @property
     def motion(self) -> Motion:
         """What was last asked for; a ramp may still be under way."""

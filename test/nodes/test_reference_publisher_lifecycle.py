@@ -7,11 +7,11 @@ pytest.importorskip("rclpy")
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from nodes.conftest import FAST, SLOW
-from nodes.graph import assert_left_cleanly
+from nodes.graph import SETTLING, assert_left_cleanly
 from nodes.walking import NODE, Walker, assert_continuous
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, Float64MultiArray
 from walk_optimizer_interfaces.srv import StartRecording
 
 from walk_optimizer.model.parameters import WalkerParameters
@@ -68,6 +68,73 @@ def test_a_manager_decides_when_references_are_streamed(graph, start, stocked, t
     (answer,) = graph.set_parameters(NODE, Parameter("initial_speed", value=FAST))
     assert (answer.successful, "it only counts when the node is activated" in answer.reason) == (False, True)
     assert_left_cleanly(node, node.stop())
+
+
+@pytest.mark.parametrize(
+    "between",
+    [
+        (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE),
+        (
+            Transition.TRANSITION_DEACTIVATE,
+            Transition.TRANSITION_CLEANUP,
+            Transition.TRANSITION_CONFIGURE,
+            Transition.TRANSITION_ACTIVATE,
+        ),
+    ],
+)
+def test_an_emergency_stop_is_in_force_until_somebody_releases_it(graph, start, stocked, between):
+    start("gait_library", **stocked)
+    own = {"initial_speed": SLOW, "walker_file": stocked["walker_file"]}
+    node = start(NODE, longest_gap=10.0, transitions="blended", **own)
+    walker = Walker(graph)
+    walker.wait_for("walking", SLOW)
+    walker.trigger("emergency_stop")
+    walker.wait_for("emergency_stop")
+    walker.states.clear()
+    joints = walker.listen(JointState, "joint_reference")
+    for transition in between:
+        joints.clear()
+        assert change(graph, transition)
+    walker.wait_for("emergency_stop")
+    graph.spin_until(lambda: len(joints) > 100, "references")
+    assert {tuple(message.position) for message in joints} == {tuple(joints[0].position)}
+    assert list(joints[0].position) == STANDING
+    assert not any(any(message.velocity) or any(message.effort) for message in joints)
+    assert "initial_speed refused: emergency stop; call ~/resume to release it" in node.output()
+    assert "released, and paused" in walker.trigger("resume")
+    walker.trigger("resume")
+    walker.wait_for("standing")
+    walker.walk(FAST)
+
+
+def test_parameters_count_from_the_first_reference_on(graph, start):
+    order = ["right_knee", "left_hip", "left_knee", "right_hip"]
+    start(NODE, autostart=False, command_interface="effort", joint_names=order)
+    assert change(graph, Transition.TRANSITION_CONFIGURE)
+    walker = Walker(graph)
+    joints, commands = (
+        walker.listen(kind, name)
+        for kind, name in ((JointState, "joint_reference"), (Float64MultiArray, "commands"))
+    )
+    for _ in range(5):
+        graph.spin_for(SETTLING)
+        joints.clear()
+        commands.clear()
+        assert change(graph, Transition.TRANSITION_ACTIVATE)
+        graph.spin_until(lambda: len(joints) > 5 and len(commands) > 5, "references")
+        assert {tuple(message.name) for message in joints} == {tuple(order)}
+        assert commands[0].layout.dim[0].label == ",".join(order)
+        assert list(commands[0].data) == list(joints[0].effort)
+        assert change(graph, Transition.TRANSITION_DEACTIVATE)
+    (answer,) = graph.set_parameters(NODE, Parameter("streaming", value=False))
+    assert answer.successful
+    for _ in range(3):
+        graph.spin_for(SETTLING)
+        joints.clear()
+        assert change(graph, Transition.TRANSITION_ACTIVATE)
+        graph.spin_for(SETTLING)
+        assert not joints
+        assert change(graph, Transition.TRANSITION_DEACTIVATE)
 
 
 def test_a_configuration_that_fails_says_why(graph, start, tmp_path):

@@ -84,6 +84,18 @@ def test_an_emergency_stop_holds_at_once_and_takes_two_calls_to_go_on():
     assert clock.advance(0.03).phase > 0
 
 
+def test_a_new_walk_runs_unless_an_emergency_stop_is_in_force():
+    clock = PhaseClock(GAP)
+    for motion, phase in ((clock.pause, 0.01), (clock.stop_at_once, 0.0)):
+        clock.advance(5.0)
+        motion()
+        clock.advance(6.0)
+        clock.restart()
+        assert (clock.holds, clock.advance(1.0).phase) == (0, 0.0)
+        assert clock.advance(1.01).phase == pytest.approx(phase)
+    assert clock.motion is Motion.EMERGENCY_STOP
+
+
 def test_a_run_is_as_fast_as_the_clock():
     clock = PhaseClock()
     assert [clock.advance(time).phase for time in (5.0, 5.01, 5.03)] == pytest.approx([0.0, 0.01, 0.02])

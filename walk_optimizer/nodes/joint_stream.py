@@ -29,14 +29,15 @@ class JointStream:
     Owns the thread that publishes. The rest is called from the node's executor.
     """
 
-    def __init__(self, node: SuiteNode, bag: StreamBag) -> None:
+    def __init__(self, node: SuiteNode, bag: StreamBag, clock: PhaseClock) -> None:
         """Create the topics; nothing is published before `start`.
 
         Args:
             node: That publishes.
             bag: That records what is published.
+            clock: That moves the walks, one after the other.
         """
-        self._node, self._bag = node, bag
+        self._node, self._bag, self._clock = node, bag, clock
         self._joints = RecordedTopic(node, JointState, "~/joint_reference", STREAM, bag)
         self._torques = RecordedTopic(node, Float64MultiArray, "~/feedforward_torques", STREAM, bag)
         self._commands = RecordedTopic(node, Float64MultiArray, "~/commands", STREAM, bag)
@@ -84,13 +85,14 @@ class JointStream:
         return self._pacer.punctuality() if self._pacer is not None else None
 
     def start(self, stand: StandProfile, rate: float) -> None:
-        """Begin to publish a walk that stands.
+        """Begin to publish a walk that stands, in the format and with the settings that there are by then.
 
         Args:
             stand: Its pose.
             rate: In [Hz].
         """
-        self.walk = Walk(stand, PhaseClock())
+        self._clock.restart()
+        self.walk = Walk(stand, self._clock)
         self._known: dict[StepProfile, StreamedGait] = {}
         self._announced: StepProfile | None = None
         self._report = None

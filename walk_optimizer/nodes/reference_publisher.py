@@ -33,7 +33,7 @@ from walk_optimizer.nodes.transition_planner import TransitionPlanner
 from walk_optimizer.nodes.walk_commands import WalkCommands
 from walk_optimizer.nodes.walk_order import SupersededError
 from walk_optimizer.nodes.walker_setting import walker_of
-from walk_optimizer.phase_clock import Motion
+from walk_optimizer.phase_clock import Motion, PhaseClock
 from walk_optimizer.request import GaitRequest
 
 # The executor may hold Python's lock for that long in [s], several times a tick; the usual is 5 ms.
@@ -51,6 +51,8 @@ class ReferencePublisherNode(ManagedNode):
         """Declare the parameters; `configure` does the rest."""
         super().__init__("reference_publisher", SETTINGS)
         self._undo = ExitStack()
+        # Outlives a deactivation, for an emergency stop has to.
+        self._phase_clock = PhaseClock()
         self.add_on_set_parameters_callback(self._check_together)
         self.parameters.apply_changes(self._apply)
 
@@ -58,7 +60,7 @@ class ReferencePublisherNode(ManagedNode):
         """Create topics and services."""
         walker = walker_of(self.parameters["walker_file"])
         self._bag = StreamBag()
-        self._stream = JointStream(self, self._bag)
+        self._stream = JointStream(self, self._bag, self._phase_clock)
         library = self.connect(GetGait, self.parameters["library_service"])
         planner = TransitionPlanner(self)
         self._cycles = CycleMessages()
@@ -87,8 +89,8 @@ class ReferencePublisherNode(ManagedNode):
             stand = self._commands.begin()
         except JointLimitError as error:
             raise ConfigurationError(f"{' or '.join(sorted(LIMIT_SETTINGS))} too low: {error}") from error
-        self._stream.start(stand, self.parameters["rate"])
         self._put_into_effect({setting.name for setting in SETTINGS})
+        self._stream.start(stand, self.parameters["rate"])
         if self.parameters["initial_speed"] != 0:
             self.later(self._walk_from_the_start)
         self.get_logger().info("ready")
@@ -115,17 +117,17 @@ class ReferencePublisherNode(ManagedNode):
         self.get_logger().info(response.message)
 
     async def _pause(self, _request: Trigger.Request, response: Trigger.Response) -> None:
-        if self._stream.walk.clock.pause() is Motion.EMERGENCY_STOP:
+        if self._phase_clock.pause() is Motion.EMERGENCY_STOP:
             response.message = "emergency stop, holds its pose already; ~/resume releases it into a pause"
         else:
             response.message = "holds its pose; ~/resume lets it go on"
 
     async def _resume(self, _request: Trigger.Request, response: Trigger.Response) -> None:
-        goes_on = self._stream.walk.clock.resume() is Motion.RUNNING
+        goes_on = self._phase_clock.resume() is Motion.RUNNING
         response.message = "goes on" if goes_on else "released, and paused; call ~/resume once more to go on"
 
     async def _emergency_stop(self, _request: Trigger.Request, response: Trigger.Response) -> None:
-        self._stream.walk.clock.stop_at_once()
+        self._phase_clock.stop_at_once()
         self._speeds.give_up()
         self._commands.give_up()
         response.message = "holds its pose without torques; ~/resume releases, and once more goes on"
@@ -176,7 +178,6 @@ class ReferencePublisherNode(ManagedNode):
             self._put_into_effect(names)
 
     def _put_into_effect(self, names: set[str]) -> None:
-        clock = self._stream.walk.clock
         if names & FORMAT_SETTINGS:
             self._stream.set_format(stream_format(self.parameters))
         if names & LIMIT_SETTINGS:
@@ -184,8 +185,8 @@ class ReferencePublisherNode(ManagedNode):
         actions: dict[str, Callable[[Any], None]] = {
             "rate": self._stream.set_rate,
             "streaming": self._stream.set_running,
-            "longest_gap": partial(setattr, clock, "longest_gap"),
-            "pause_time": partial(setattr, clock, "ramp"),
+            "longest_gap": partial(setattr, self._phase_clock, "longest_gap"),
+            "pause_time": partial(setattr, self._phase_clock, "ramp"),
             "record": self._recording.follow_parameter,
         }
         for name in names & actions.keys():
