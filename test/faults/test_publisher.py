@@ -25,6 +25,7 @@ from walk_optimizer_interfaces.srv import SetGait, StartRecording, StopRecording
 from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.nodes.publisher_settings import SETTINGS
 from walk_optimizer.recording import describe_bag, repair_bag
+from walk_optimizer.recording.records import DamageKind
 from walk_optimizer.request import gait_table_settings
 
 pytestmark = pytest.mark.ros
@@ -223,7 +224,8 @@ def test_the_stream_goes_on_when_the_disk_is_full(graph, own, tmp_path):
     graph.spin_until(lambda: len(joints) > mark + 100, "the stream going on")
     assert_continuous(joints)
     info = describe_bag(tmp_path / "bag")
-    assert info.is_whole
+    # There may be no space for the index; every message that was stored is there.
+    assert {damage.kind for file in info.files for damage in file.damage} <= {DamageKind.INDEX}
     assert info.message_count > 100
 
 

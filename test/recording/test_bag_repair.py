@@ -4,6 +4,7 @@ import errno
 import os
 import random
 import shutil
+import struct
 import tracemalloc
 from dataclasses import dataclass
 from functools import cache
@@ -12,19 +13,31 @@ from tempfile import TemporaryDirectory
 
 import lz4.frame
 import pytest
+import yaml
 import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
-from mcap.records import Chunk, Header
+from mcap.records import Chunk, DataEnd, Footer, Header
 from mcap.writer import Writer
-from recording.samples import JOINTS, PERIOD_NS, START_NS, STORE, joint_state, number_of, string, write_bag
+from recording.samples import (
+    GAIT,
+    JOINTS,
+    PERIOD_NS,
+    START_NS,
+    STORE,
+    joint_state,
+    number_of,
+    string,
+    write_bag,
+)
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, ReaderError, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
 from walk_optimizer.recording import (
+    BagWriter,
     Compression,
     RecorderSettings,
     describe_bag,
@@ -209,6 +222,77 @@ def test_a_split_bag_keeps_its_files_and_its_texts(tmp_path):
     ][:2]
 
 
+def without_index(data: bytes) -> bytes:
+    """Return a file with a bare end, as a disk without space for more leaves it."""
+    footer = len(data) - len(MAGIC) - struct.calcsize("<QQI")
+    (summary,) = struct.unpack_from("<Q", data, footer)
+    end = RecordBuilder()
+    DataEnd(0).write(end)
+    whole_end = len(end.end())
+    DataEnd(0).write(end)
+    Footer(summary_start=0, summary_offset_start=0, summary_crc=0).write(end)
+    return data[: summary - whole_end] + end.end() + MAGIC
+
+
+def test_a_file_without_index_is_told_and_repaired(tmp_path):
+    with BagWriter(tmp_path / "walk", RecorderSettings(min_free_bytes=0), topics=[JOINTS, GAIT]) as writer:
+        for number in range(100):
+            # Two threads take their times, and one is overtaken.
+            writer.write(JOINTS.name, joint_state(number), START_NS + number * PERIOD_NS)
+            writer.write(GAIT.name, string("gait"), START_NS + number * PERIOD_NS - 1)
+    path = tmp_path / "walk" / "walk_0.mcap"
+    path.write_bytes(without_index(path.read_bytes()))
+    with pytest.raises(ReaderError, match="Use an indexed file"):
+        joint_numbers(tmp_path / "walk")
+    info = describe_bag(tmp_path / "walk")
+    assert (info.is_whole, info.message_count) == (False, 200)
+    assert "damaged (1 x index); `bag repair` writes a whole bag" in format_bag(info)
+    assert "no index at the end" in format_bag(info)
+    repaired = repair_bag(tmp_path / "walk").destination
+    assert describe_bag(repaired).is_whole
+    assert joint_numbers(repaired) == list(range(100))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "fault"),
+    [
+        ("message_count", 57, "is out of date: it tells of 57 messages, the files hold 2001"),
+        ("message_count", "many", "is out of date: it tells of 0 messages, the files hold 2001"),
+        ("relative_file_paths", ["walk_0.mcap"], "lacks files: walk_1.mcap"),
+        (
+            "relative_file_paths",
+            ["walk/walk_0.mcap", "walk_1.mcap", "x.mcap"],
+            "names files that are not there: x.mcap",
+        ),
+        (None, None, "is missing or can't be read"),
+    ],
+)
+def test_metadata_that_differ_from_the_files_are_told_and_repaired(tmp_path, key, value, fault):
+    bag = write_bag(tmp_path / "walk", range(2000), RecorderSettings(max_file_bytes=400_000))
+    assert [path.name for path in sorted(bag.glob("*.mcap"))] == ["walk_0.mcap", "walk_1.mcap"]
+    assert describe_bag(bag).is_whole
+    content = yaml.safe_load((bag / "metadata.yaml").read_text())
+    content["rosbag2_bagfile_information"][key] = value
+    (bag / "metadata.yaml").write_text(yaml.safe_dump(content) if key else "")
+    info = describe_bag(bag)
+    assert not info.is_whole
+    assert [text.partition("metadata.yaml ")[2] for text in info.metadata_faults] == [fault]
+    assert "damaged (metadata.yaml); `bag repair` writes a whole bag" in format_bag(info)
+    assert f"  metadata.yaml {fault}" in format_bag(info)
+    repaired = repair_bag(bag).destination
+    assert describe_bag(repaired).is_whole
+    assert joint_numbers(repaired) == list(range(2000))
+
+
+def test_damage_is_not_told_twice(tmp_path):
+    """Metadata that tell of messages which a damaged chunk has lost are right."""
+    bag = write_bag(tmp_path / "walk", range(COUNT), RecorderSettings(chunk_bytes=CHUNK_BYTES))
+    whole = sample(Compression.NONE)
+    (bag / "walk_0.mcap").write_bytes(flip(whole.data, 8 * (sum(whole.chunks[2][:2]) // 2)))
+    assert describe_bag(bag).count_damage(DamageKind.CHUNK) == 1
+    assert describe_bag(bag).metadata_faults == ()
+
+
 def test_a_bag_without_readable_metadata_is_still_a_bag(tmp_path):
     bag = write_bag(tmp_path / "walk", range(10))
     for text in (
@@ -259,7 +343,10 @@ def test_repair_is_advised_only_where_something_can_be_saved(tmp_path):
     whole = write_bag(tmp_path / "walk", range(2000)) / "walk_0.mcap"
     for size, words in (
         (0, "damaged (1 x cut_off); nothing was recorded that could be saved"),
-        (whole.stat().st_size // 2, "damaged (1 x cut_off); repair writes a whole bag from what is left"),
+        (
+            whole.stat().st_size // 2,
+            "damaged (1 x cut_off); `bag repair` writes a whole bag from what is left",
+        ),
     ):
         cut = tmp_path / f"cut_{size}.mcap"
         cut.write_bytes(whole.read_bytes()[:size])

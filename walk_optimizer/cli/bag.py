@@ -15,13 +15,14 @@ Works on bag directories and on single .mcap files. Only playing needs ROS."""
 _INFO = """\
 say what is in a bag and whether it is whole
 
-Reads all of it and checks every checksum; metadata.yaml is not believed. The exit code
-is 1 when the bag is damaged."""
+Reads all of it and checks every checksum; metadata.yaml is not believed, but compared.
+The exit code is 1 when the bag is damaged, lacks its index, or its metadata.yaml differs:
+then `bag repair` writes a whole one."""
 
 _REPAIR = """\
 write a whole bag from what can be trusted of a damaged one
 
-The damaged bag stays as it is."""
+With an index and a metadata.yaml that fit. The damaged bag stays as it is."""
 
 _PLAY = """\
 publish the messages of a bag again, for machines without rosbag2

@@ -1,9 +1,9 @@
 """A bag as it lies on the disk: its files, and what it says about itself, read with distrust."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import yaml
@@ -25,17 +25,22 @@ class Description:
         compression_mode: In capitals, such as MESSAGE; empty for none.
         ros_distro: ROS distribution that recorded the bag; empty when unknown.
         custom_data: Free texts.
+        file_names: Its files, without folders.
+        message_count: Messages in all of them; 0 when unknown.
     """
 
     storage: str = ""
     compression_mode: str = ""
     ros_distro: str = ""
     custom_data: tuple[tuple[str, str], ...] = ()
+    file_names: tuple[str, ...] = ()
+    message_count: int = 0
 
     @classmethod
     def from_mapping(cls, content: Mapping[str, Any]) -> "Description":
         """Read a description of any version."""
         custom = content.get("custom_data")
+        files, count = content.get("relative_file_paths"), content.get("message_count")
         return cls(
             storage=_text(content, "storage_identifier"),
             compression_mode=_text(content, "compression_mode").upper(),
@@ -45,6 +50,13 @@ class Description:
                 for key, value in (custom.items() if isinstance(custom, Mapping) else ())
                 if isinstance(key, str | int) and isinstance(value, str | int | float)
             ),
+            # Bags of version 3 and before name their folder too.
+            file_names=tuple(
+                PurePath(name).name
+                for name in (files if isinstance(files, list) else ())
+                if isinstance(name, str)
+            ),
+            message_count=count if isinstance(count, int) else 0,
         )
 
 
@@ -64,6 +76,33 @@ def read_description(directory: Path) -> Description | None:
 def parse_description(text: str) -> Description | None:
     """Return what the description within an .mcap file says; None when it can't be read."""
     return _described(_load(text))
+
+
+def metadata_faults(
+    description: Description | None, files: Sequence[Path], messages: int | None
+) -> tuple[str, ...]:
+    """Return what other readers, which believe metadata.yaml, miss for it: a sentence each.
+
+    Args:
+        description: What it says; None when it can't be read.
+        files: The files of the bag.
+        messages: How many they hold; None when damage leaves that open.
+    """
+    if description is None:
+        return (f"{METADATA_FILE} is missing or can't be read",)
+    names = [path.name for path in files]
+    listed = set(description.file_names)
+    lacking = ", ".join(name for name in names if name not in listed)
+    gone = ", ".join(name for name in description.file_names if name not in names)
+    faults = []
+    if lacking:
+        faults.append(f"{METADATA_FILE} lacks files: {shortened(lacking)}")
+    if gone:
+        faults.append(f"{METADATA_FILE} names files that are not there: {shortened(gone)}")
+    if messages not in (None, description.message_count):
+        told = f"it tells of {description.message_count} messages, the files hold {messages}"
+        faults.append(f"{METADATA_FILE} is out of date: {told}")
+    return tuple(faults)
 
 
 def require_readable(path: Path, description: Description | None) -> None:

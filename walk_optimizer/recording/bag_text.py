@@ -25,6 +25,7 @@ def format_bag(info: BagInfo) -> str:
     lines += [f"{key}: {value}" for key, value in info.custom_data]
     for file in info.files:
         lines += [f"  {file.path.name}, byte {item.offset}: {item.reason}" for item in file.damage]
+    lines += [f"  {fault}" for fault in info.metadata_faults]
     return "\n".join(lines)
 
 
@@ -32,7 +33,8 @@ def _state(info: BagInfo) -> str:
     if info.is_whole:
         return "whole, all checksums right"
     found = [f"{info.count_damage(kind)} x {kind.value}" for kind in DamageKind if info.count_damage(kind)]
-    saved = "repair writes a whole bag from what is left"
+    found += ["metadata.yaml"] * bool(info.metadata_faults)
+    saved = "`bag repair` writes a whole bag from what is left"
     rest = saved if info.message_count else "nothing was recorded that could be saved"
     return f"damaged ({', '.join(found)}); {rest}"
 

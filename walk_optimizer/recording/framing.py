@@ -79,7 +79,7 @@ def read_summary(data: mmap) -> list[McapRecord] | None:
         data: The whole file.
 
     Returns:
-        The records, or None when the end is missing or damaged.
+        The records, or None when the end is missing or damaged, or has no such part.
     """
     footer = len(data) - len(MAGIC) - _FOOTER_LENGTH
     if footer < len(MAGIC) or data[-len(MAGIC) :] != MAGIC:
@@ -87,10 +87,8 @@ def read_summary(data: mmap) -> list[McapRecord] | None:
     if RECORD_HEAD.unpack_from(data, footer) != (Opcode.FOOTER, 8 + 8 + 4):
         return None
     start, _, checksum = struct.unpack_from("<QQI", data, footer + RECORD_HEAD.size)
-    if not start:
-        return []
     # The checksum covers the summary and all of the footer before the checksum itself.
-    covered = data[start : len(data) - len(MAGIC) - 4] if start <= footer else b""
+    covered = data[start : len(data) - len(MAGIC) - 4] if 0 < start <= footer else b""
     if not covered or (checksum and zlib.crc32(covered) != checksum):
         return None
     return _summary_records(data, start, footer)
@@ -132,7 +130,8 @@ def _check_ending(data: mmap, block: Block) -> Iterator[Damage]:
         reason = f"the checksum of the data section is {actual:08x}, the file says {checksum:08x}"
         yield Damage(block.offset, DamageKind.CHECKSUM, reason)
     if read_summary(data) is None:
-        yield Damage(block.offset, DamageKind.INDEX, "the index at the end is missing or damaged")
+        reason = "no index at the end, or a damaged one; other readers may refuse the file or lose messages"
+        yield Damage(block.offset, DamageKind.INDEX, reason)
 
 
 def _summary_records(data: mmap, start: int, end: int) -> list[McapRecord] | None:

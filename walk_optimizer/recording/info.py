@@ -1,7 +1,7 @@
 """What is in a bag, and whether it is whole, without ROS."""
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,13 +9,14 @@ from walk_optimizer.errors import quoted
 from walk_optimizer.recording.bag_directory import (
     Description,
     bag_files,
+    metadata_faults,
     parse_description,
     read_description,
     require_readable,
 )
 from walk_optimizer.recording.errors import ForeignTopicError
 from walk_optimizer.recording.metadata import FileEntry
-from walk_optimizer.recording.records import Damage, DamageKind
+from walk_optimizer.recording.records import LOSING_MESSAGES, Damage, DamageKind
 from walk_optimizer.recording.scan import FileScan
 from walk_optimizer.recording.topics import SERIALIZATION_FORMAT, TopicInfo
 
@@ -56,13 +57,14 @@ class FileInfo:
 
 @dataclass(frozen=True)
 class BagInfo:
-    """A bag as its files say it is; metadata.yaml is not believed.
+    """A bag as its files say it is; metadata.yaml is compared with them, not believed.
 
     Attributes:
         path: The bag.
         files: Its files, in the order of recording.
         ros_distro: ROS distribution that the bag names; empty when unknown.
         has_metadata: Whether there is a metadata.yaml that can be read.
+        metadata_faults: How metadata.yaml differs from the files, a sentence each.
         custom_data: Free texts of the bag.
     """
 
@@ -70,12 +72,13 @@ class BagInfo:
     files: tuple[FileInfo, ...]
     ros_distro: str
     has_metadata: bool
+    metadata_faults: tuple[str, ...]
     custom_data: tuple[tuple[str, str], ...]
 
     @property
     def is_whole(self) -> bool:
-        """Whether all files were ended properly and every checksum is right."""
-        return all(file.is_whole for file in self.files)
+        """Whether all files were ended properly, every checksum is right, and metadata.yaml too."""
+        return all(file.is_whole for file in self.files) and not self.metadata_faults
 
     @property
     def is_cut_off(self) -> bool:
@@ -163,8 +166,15 @@ def describe_bag(path: Path) -> BagInfo:
         files=files,
         ros_distro=description.ros_distro,
         has_metadata=metadata is not None,
+        metadata_faults=_metadata_faults(metadata, files) if path.is_dir() else (),
         custom_data=description.custom_data,
     )
+
+
+def _metadata_faults(metadata: Description | None, files: Sequence[FileInfo]) -> tuple[str, ...]:
+    kinds = {damage.kind for file in files for damage in file.damage}
+    messages = None if kinds & LOSING_MESSAGES else sum(file.entry.message_count for file in files)
+    return metadata_faults(metadata, [file.path for file in files], messages)
 
 
 def _describe_file(scan: FileScan) -> FileInfo:

@@ -60,6 +60,10 @@ class DamageKind(Enum):
     """The checksum over the whole data section is wrong."""
 
 
+LOSING_MESSAGES = frozenset({DamageKind.CHUNK, DamageKind.RECORD, DamageKind.CUT_OFF})
+"""Damage that leaves open how many messages there were."""
+
+
 @dataclass(frozen=True)
 class Damage:
     """A stretch of a file that cannot be trusted.
