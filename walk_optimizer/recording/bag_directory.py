@@ -15,6 +15,9 @@ from walk_optimizer.recording.metadata import METADATA_FILE, STORAGE_IDENTIFIER,
 # Compression that chunks don't tell: of whole files, or of each message. A third one, storage, is theirs.
 _HIDDEN_COMPRESSIONS = ("FILE", "MESSAGE")
 
+# In characters: of a bag of some 20 000 files, which takes half a minute to parse.
+_LONGEST_DESCRIPTION = 1 << 22
+
 
 @dataclass(frozen=True)
 class Description:
@@ -65,8 +68,10 @@ def read_description(directory: Path) -> Description | None:
 
     What is in the files counts, so a bag stays a bag without its metadata.yaml.
     """
+    path = directory / METADATA_FILE
     try:
-        text = (directory / METADATA_FILE).read_text(encoding="utf-8")
+        # A named pipe would wait for a writer forever.
+        text = path.read_text(encoding="utf-8") if path.is_file() else ""
     except (OSError, UnicodeDecodeError):
         return None
     content = _load(text)
@@ -157,6 +162,8 @@ def _recording_order(path: Path) -> tuple[int, str]:
 
 
 def _load(text: str) -> object:
+    if len(text) > _LONGEST_DESCRIPTION:
+        return None
     try:
         content: object = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, TypeError, RecursionError):
