@@ -121,14 +121,21 @@ def facing_up(points):
     return len(normals) > 0 and (normals[:, 2] > 0).all()
 
 
-def test_words_are_spaced_like_their_letters(walk):
+def test_labels_are_beside_the_legs_and_spaced_like_their_letters(walk):
     # RViz takes a space's width from scale.x, and more than a metre if that is 0.
     walk.announce()
-    walk.send(0.5)
-    _, markers = walk.picture()
-    labels = [one for one in markers.values() if one.type == Marker.TEXT_VIEW_FACING and one.text]
-    assert {one.ns for one in labels} == {"ground_metres", "ground_reaction_size", "joint_torque_sizes"}
-    assert all(0.25 <= one.scale.x / one.scale.z <= 1.0 for one in labels)
+    for time in np.arange(0.5, 2.0, 0.13):
+        walk.send(float(time))
+        transforms, markers = walk.picture()
+        labels = [one for one in markers.values() if one.type == Marker.TEXT_VIEW_FACING and one.text]
+        assert {one.ns for one in labels} == {"ground_metres", "ground_reaction_size", "joint_torque_sizes"}
+        assert all(0.25 <= one.scale.x / one.scale.z <= 1.0 for one in labels)
+        knees = [placement(transforms, f"{side}_lower_leg").translation[0] for side in ("left", "right")]
+        behind, ahead = (
+            [markers["joint_torque_sizes", number].pose.position.x for number in numbers]
+            for numbers in ((0, 1), (2, 3))
+        )
+        assert max(behind) < min(knees) - 0.15 < max(knees) + 0.15 < min(ahead)
 
 
 def told(graph, reports):

@@ -11,6 +11,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from walk_optimizer.scene.scene import Scene
 from walk_optimizer.scene.torques import TorqueArc
+from walk_optimizer.scene.tracking import WalkerPose
 
 FloatArray = NDArray[np.float64]
 Colour = tuple[float, float, float, float]
@@ -29,9 +30,8 @@ _TEXT_HEIGHT = 0.06
 _SPACE_WIDTH = 0.03
 _GROUND_WIDTH = 0.6
 _TORQUE_WIDTH = 0.012
-_FORCE_LABEL_AHEAD = 0.2
-# Torques of the left leg are written behind it, those of the right leg ahead.
-_LABEL_AHEAD = (-0.27, 0.27)
+# What is the left leg's is written behind the hip, what is the right leg's ahead: no leg swings as far.
+_LABEL_AHEAD = (-0.38, 0.38)
 # Arcs lie this much further outside than the legs [-].
 _BESIDE_LEG = 1.3
 # A smaller force is none, [N].
@@ -64,10 +64,10 @@ class SceneMarkers:
             markers += [
                 self._path("feet_walked", side, scene.walked[side], _WALKED_WIDTH),
                 self._path("feet_ahead", side, scene.ahead[side], _AHEAD_WIDTH),
-                *self._reaction(side, scene.pose.feet[side], scene.reaction[side], force_scale),
+                *self._reaction(side, scene.pose, scene.reaction[side], force_scale),
             ]
         for number, arc in enumerate(scene.torques):
-            markers += self._torque(number, arc)
+            markers += self._torque(number, arc, scene.pose)
         for marker in markers:
             marker.header.stamp = stamp
         return MarkerArray(markers=markers)
@@ -90,22 +90,23 @@ class SceneMarkers:
         marker.points = [_point(x, self._sideways[side], z) for x, z in path.T.tolist()]
         return marker if path.shape[1] > 1 else _removed(marker)
 
-    def _reaction(self, side: int, foot: FloatArray, force: FloatArray, scale: float) -> list[Marker]:
+    def _reaction(self, side: int, pose: WalkerPose, force: FloatArray, scale: float) -> list[Marker]:
         """Return the arrow of a ground reaction, which begins at the foot, and its size in words."""
         arrow = self._marker("ground_reaction", side, Marker.ARROW, _FORCE_COLOUR)
         label = self._label("ground_reaction_size", side, _TEXT_COLOUR)
+        foot = pose.feet[side]
         size = math.hypot(*force)
         if size < _LEAST_FORCE:
             return [_removed(arrow), _removed(label)]
         tip = foot + scale * force
         arrow.points = [_point(point[0], self._sideways[side], point[1]) for point in (foot, tip)]
         arrow.scale = Vector3(x=_SHAFT, y=_HEAD, z=_HEAD_LENGTH)
-        middle = foot + 0.4 * scale * force
-        label.pose.position = _point(middle[0] + _FORCE_LABEL_AHEAD, self._sideways[side], middle[1])
+        height = foot[1] + 0.4 * scale * force[1]
+        label.pose.position = _point(pose.base[0] + _LABEL_AHEAD[side], self._sideways[side], height)
         label.text = f"{size:.0f} N"
         return [arrow, label]
 
-    def _torque(self, number: int, arc: TorqueArc) -> list[Marker]:
+    def _torque(self, number: int, arc: TorqueArc, pose: WalkerPose) -> list[Marker]:
         """Return the arc of a joint torque, outside of the leg, and its size in words."""
         side = number // 2
         y = _BESIDE_LEG * self._sideways[side]
@@ -114,7 +115,7 @@ class SceneMarkers:
         line.points = [_point(x, y, z) for x, z in arc.points.T.tolist()]
         label = self._label("joint_torque_sizes", number, _TORQUE_COLOUR)
         label.text = f"{round(arc.torque, 1) + 0.0:.1f} N m"
-        label.pose.position = _point(arc.centre[0] + _LABEL_AHEAD[side], y, arc.centre[1] + _TEXT_HEIGHT)
+        label.pose.position = _point(pose.base[0] + _LABEL_AHEAD[side], y, arc.centre[1] + _TEXT_HEIGHT)
         return [line, label]
 
     def _ground(self, ground: FloatArray) -> list[Marker]:
