@@ -14,6 +14,7 @@ from walk_optimizer.recording.errors import (
 )
 from walk_optimizer.recording.mcap_file import McapFile
 from walk_optimizer.recording.metadata import METADATA_FILE, BagMetadata, FileEntry, file_name
+from walk_optimizer.recording.reserve import Reserve
 from walk_optimizer.recording.settings import RecorderSettings
 from walk_optimizer.recording.topics import (
     NANOSECONDS_PER_SECOND,
@@ -62,11 +63,16 @@ class BagWriter:
         self._finished: list[FileEntry] = []
         self._finished_bytes = 0
         self._file: McapFile | None = None
+        self._closed = False
+        self._reserve = Reserve(directory)
+        self._description_bytes = 0
         _create_directory(directory)
         try:
             self._file = self._begin_file()
             self._write_metadata()
+            self._keep_reserve(self._file)
         except RecordingError:
+            self._reserve.release()
             if self._file is not None:
                 self._file.discard()
             # It was made just now, and a bag without files is none.
@@ -121,7 +127,7 @@ class BagWriter:
         self._topics[topic.name] = topic
         self._write_metadata()
 
-    def write(self, topic: str, data: bytes, log_time_ns: int, publish_time_ns: int | None = None) -> None:
+    def write(self, topic: str, data: bytes, log_time_ns: int, publish_time_ns: int | None = None) -> bool:
         """Append a message.
 
         Args:
@@ -130,20 +136,29 @@ class BagWriter:
             log_time_ns: When it was recorded, in [ns].
             publish_time_ns: When it was published, in [ns]; `log_time_ns` when None.
 
+        Returns:
+            Whether that has brought a chunk to the disk.
+
         Raises:
             TopicError: If the topic was not announced.
             MessageError: If data or time cannot be stored.
-            RecordingError: If the disk refuses.
+            RecordingError: If the disk refuses; if it is just full, what was given so far is in the bag.
         """
         require_message(self._topics, topic, data, log_time_ns)
         if self._is_full(self._open_file(), log_time_ns):
             self.split()
         published_ns = log_time_ns if publish_time_ns is None else publish_time_ns
-        self._open_file().write(topic, data, log_time_ns, published_ns)
+        file = self._open_file()
+        stored = file.write(topic, data, log_time_ns, published_ns)
+        if stored:
+            self._keep_reserve(file)
+        return stored
 
     def flush(self) -> None:
         """Bring what was written to the disk, the open chunk too if the settings say so."""
-        self._open_file().sync(self.settings.close_chunk_on_flush)
+        file = self._open_file()
+        file.sync(self.settings.close_chunk_on_flush)
+        self._keep_reserve(file)
 
     def split(self) -> None:
         """End the current file and begin the next one."""
@@ -154,15 +169,20 @@ class BagWriter:
     def close(self) -> None:
         """End the bag; closing it again changes nothing.
 
-        After a failed write the file gets an end that readers accept, without the open chunk.
+        On a full disk the reserve has the space for that. After another failed write the file gets an end
+        without an index, and without the open chunk.
 
         Raises:
             RecordingError: If the disk refuses; what could be ended is ended nevertheless.
         """
-        if self._file is None:
+        if self._closed:
             return
+        self._closed = True
+        self._reserve.release()
         try:
-            self._end_file(self._file)
+            # There is none if a further one could not be begun.
+            if self._file is not None:
+                self._end_file(self._file)
         finally:
             self._write_metadata()
 
@@ -172,8 +192,10 @@ class BagWriter:
         return self._file
 
     def _begin_file(self) -> McapFile:
+        # Where the disk is full already, no further file is begun.
+        self._reserve.hold(self._description_bytes)
         name = file_name(self.directory.name, len(self._finished))
-        file = McapFile(self.directory / name, self.settings)
+        file = McapFile(self.directory / name, self.settings, self._reserve)
         try:
             # It stands again at the end, with the counts; a killed recording has only this one.
             file.add_metadata(self._metadata(file.entry).to_record())
@@ -207,10 +229,21 @@ class BagWriter:
         entries = [*self._finished, *([current] if current else [])]
         return BagMetadata(self.topics, entries, self._ros_distro, self.custom_data)
 
+    def _keep_reserve(self, file: McapFile) -> None:
+        """Keep the space for the end of the bag: of its open file, and of its description.
+
+        Raises:
+            RecordingError: If the disk is full.
+        """
+        self._reserve.hold(file.end_bytes + self._description_bytes)
+
     def _write_metadata(self) -> None:
         path = self.directory / METADATA_FILE
+        text = self._metadata(self._file.entry if self._file else None).to_file()
+        # It is written to the file and beside it, and its numbers grow longer.
+        self._description_bytes = 3 * len(text)
         try:
-            replace_text(path, self._metadata(self._file.entry if self._file else None).to_file())
+            replace_text(path, text)
         except OSError as error:
             raise write_error(path, error) from error
 

@@ -10,10 +10,12 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import DataEnd, Footer
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
-from walk_optimizer.recording.disk import RecordFile, write_error
+from walk_optimizer.recording.disk import write_error
 from walk_optimizer.recording.errors import RecordingError
 from walk_optimizer.recording.framing import MAGIC
 from walk_optimizer.recording.metadata import FileEntry
+from walk_optimizer.recording.record_file import RecordFile
+from walk_optimizer.recording.reserve import Reserve
 from walk_optimizer.recording.scan import METADATA_KEY, METADATA_RECORD
 from walk_optimizer.recording.settings import Compression, RecorderSettings
 from walk_optimizer.recording.topics import TopicInfo, qos_to_yaml
@@ -28,6 +30,11 @@ _COMPRESSIONS = {
     Compression.LZ4: CompressionType.LZ4,
 }
 
+# Upper bounds in [byte] of what the end of a file says of each chunk, of each topic in a chunk, of each topic
+# beside its definition and quality of service, and of the rest; and a chunk of the usual size.
+_PER_CHUNK, _PER_CHANNEL, _PER_TOPIC, _ENDING = 96, 10, 512, 1024
+_CHUNK = 64 * 1024
+
 
 class McapFile:
     """Writes one file such that it ends with a whole record at any time.
@@ -35,12 +42,13 @@ class McapFile:
     Owns the file and its counts. Does not own when to begin another one, or metadata.yaml.
     """
 
-    def __init__(self, path: Path, settings: RecorderSettings) -> None:
+    def __init__(self, path: Path, settings: RecorderSettings, reserve: Reserve) -> None:
         """Create the file.
 
         Args:
             path: File to create; it must not exist yet.
             settings: Size and compression of the chunks.
+            reserve: Space for what is written when the disk is full.
 
         Raises:
             BagNotWritableError: If the file cannot be created.
@@ -53,8 +61,11 @@ class McapFile:
         self._span: tuple[int, int] | None = None
         self._channels: dict[str, int] = {}
         self._schemas: dict[tuple[str, str], int] = {}
+        self._chunks = 0
+        self._largest_chunk = _CHUNK
+        self._topic_bytes = 0
         try:
-            self._file = RecordFile(path)
+            self._file = RecordFile(path, reserve)
         except OSError as error:
             raise write_error(path, error) from error
         # Typed Any because some methods of the MCAP writer have no annotations at all.
@@ -95,8 +106,17 @@ class McapFile:
         """Earliest log time that was written, in [ns]; None without messages."""
         return self._span[0] if self._span else None
 
+    @property
+    def end_bytes(self) -> int:
+        """Space in [byte] that suffices to end the file: for the open chunk and the index."""
+        # The open chunk may hold the topics too; it has an index of its own, of less than its size.
+        index = self._chunks * (_PER_CHUNK + _PER_CHANNEL * len(self._channels))
+        return 2 * self._largest_chunk + 2 * self._topic_bytes + index + _ENDING
+
     def add_topic(self, topic: TopicInfo) -> None:
         """Announce a topic; its messages may follow."""
+        qos = qos_to_yaml(topic.qos)
+        self._topic_bytes += len(topic.definition) + len(qos) + _PER_TOPIC
         with self._writing():
             schema = self._schemas.get((topic.type_name, topic.definition))
             if schema is None:
@@ -109,13 +129,13 @@ class McapFile:
                 topic.serialization_format,
                 schema,
                 {
-                    "offered_qos_profiles": qos_to_yaml(topic.qos),
+                    "offered_qos_profiles": qos,
                     "topic_type_hash": topic.type_hash,
                 },
             )
 
-    def write(self, topic: str, data: bytes, log_time_ns: int, publish_time_ns: int) -> None:
-        """Append a message of an announced topic."""
+    def write(self, topic: str, data: bytes, log_time_ns: int, publish_time_ns: int) -> bool:
+        """Append a message of an announced topic, and return whether that has ended a chunk."""
         start, end = self._span or (log_time_ns, log_time_ns)
         self._span = min(start, log_time_ns), max(end, log_time_ns)
         self._counts[topic] += 1
@@ -126,7 +146,8 @@ class McapFile:
         except OSError as error:
             raise self._failed(error) from error
         finally:
-            self._note_growth(size)
+            grown = self._note_growth(size)
+        return grown
 
     def add_metadata(self, text: str) -> None:
         """Append a description of the bag."""
@@ -178,7 +199,7 @@ class McapFile:
         return FileEntry(self.path.name, dict(self._counts), start, end)
 
     def _write_bare_end(self) -> None:
-        """Make a whole file of one whose writer has lost its thread: readers then scan it."""
+        """End a file whose writer has lost its thread; without an index, not every reader takes it."""
         end = RecordBuilder()
         DataEnd(0).write(end)
         Footer(summary_start=0, summary_offset_start=0, summary_crc=0).write(end)
@@ -193,10 +214,14 @@ class McapFile:
         finally:
             self._note_growth(size)
 
-    def _note_growth(self, size: int) -> None:
+    def _note_growth(self, size: int) -> bool:
         """Take note when the file has grown, which here only the end of a chunk makes it do."""
-        if self.size != size:
+        growth = self._file.tell() - size
+        if growth:
             self.stored = self._written()
+            self._chunks += 1
+            self._largest_chunk = max(self._largest_chunk, growth)
+        return growth != 0
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

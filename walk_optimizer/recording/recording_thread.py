@@ -137,9 +137,7 @@ class RecordingThread:
         if isinstance(item, TopicInfo):
             self._writer.add_topic(item)
             return
-        size = self._writer.size
-        self._writer.write(item.topic, item.data, item.log_time_ns, item.publish_time_ns)
-        if self._writer.size != size:
+        if self._writer.write(item.topic, item.data, item.log_time_ns, item.publish_time_ns):
             self._measure_space()
 
     def _measure_space(self) -> None:
