@@ -50,6 +50,7 @@ class PhaseClock:
 
     Attributes:
         holds: How often the clock has jumped, so that the walk held.
+        suspended: Whether the walk comes to a hold, over the ramp, whatever else is asked for.
     """
 
     def __init__(self, longest_gap: float = 0.1, ramp: float = 0.3) -> None:
@@ -63,6 +64,7 @@ class PhaseClock:
         """
         self.longest_gap, self.ramp = longest_gap, ramp
         self.holds = 0
+        self.suspended = False
         self._jumped = False
         self._clock: float | None = None
         self._motion = Motion.RUNNING
@@ -73,8 +75,9 @@ class PhaseClock:
         """Begin a new walk with the next time that the clock shows; an emergency stop stays in force."""
         with self._lock:
             self.holds, self._jumped, self._clock = 0, False, None
-            if self._motion is not Motion.EMERGENCY_STOP:
-                self._motion, self._progress = Motion.RUNNING, 1.0
+            if self._motion is Motion.PAUSED:
+                self._motion = Motion.RUNNING
+            self._progress = 1.0 if self._runs else 0.0
 
     @property
     def motion(self) -> Motion:
@@ -84,7 +87,12 @@ class PhaseClock:
     @property
     def at_rest(self) -> bool:
         """Whether the walk is held and no ramp is under way."""
-        return self._motion is not Motion.RUNNING and self._progress == 0
+        return not self._runs and self._progress == 0
+
+    @property
+    def _runs(self) -> bool:
+        """Whether the walk is to move."""
+        return self._motion is Motion.RUNNING and not self.suspended
 
     def pause(self) -> Motion:
         """Come to a hold over the ramp, and return what it is now: an emergency stop stays one."""
@@ -130,7 +138,7 @@ class PhaseClock:
 
     def _moved(self, elapsed: float) -> Advance:
         """Follow the ramp, then hold or run for what is left of the time; no time leaves all as it is."""
-        running = self._motion is Motion.RUNNING
+        running = self._runs
         begin, goal = self._progress, 1.0 if running else 0.0
         on_ramp = min(elapsed, abs(goal - begin) * self.ramp)
         # Exactly at the goal once it is reached, whatever rounding says.

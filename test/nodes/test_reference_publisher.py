@@ -378,6 +378,10 @@ def test_operators_are_told_why_nothing_is_streamed(graph, start):
         return any(words in one.message for array in heard for one in array.status)
 
     graph.spin_until(lambda: told("the clock stands still, start what publishes /clock"), "the clock")
+    states = graph.subscribe(WalkState, f"{NODE}/state", LATCHED)
+    assert graph.call(Trigger, f"{NODE}/emergency_stop").success
+    wait_for_state(graph, states, "emergency_stop")
+    graph.spin_until(lambda: told("emergency stop, holds its pose without torques"), "the emergency stop")
     clock, steps = graph.publisher(Clock, "/clock"), itertools.count(1)
 
     def told_while_it_leaps():

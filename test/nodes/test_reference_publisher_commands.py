@@ -11,7 +11,7 @@ pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Vector3
 from nodes.conftest import FAST, SLOW, stock
-from nodes.walking import NODE, assert_continuous, standing_walker
+from nodes.walking import MARGIN, NODE, assert_continuous, standing_walker
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -149,6 +149,40 @@ def test_pause_and_resume(graph, walker, joints):
     assert walker.trigger("resume") == "goes on"
     walker.wait_for("walking")
     graph.spin_until(lambda: any(joints[-1].velocity), "the walk going on")
+
+
+def test_where_nothing_is_to_be_streamed_the_walk_is_held_and_goes_on_from_there(graph, walker, joints):
+    walker.walk(FAST)
+    assert graph.set_parameters(NODE, Parameter("streaming", value=False))[0].successful
+    walker.wait_for("paused")
+    assert "nothing is streamed; set `streaming` to true" in walker.states[-1].message
+    graph.spin_until(lambda: not any(joints[-1].velocity), "rest")
+    held = len(joints)
+    graph.spin_for(1.0)
+    assert len(joints) == held
+    assert "from the next step on, once `streaming` is true; " in walker.set_gait(SLOW).message
+    assert graph.set_parameters(NODE, Parameter("streaming", value=True))[0].successful
+    walker.wait_for("walking", SLOW)
+    moved = np.abs(np.subtract(joints[held].position, joints[held - 1].position))
+    assert moved.max() < 0.01
+    assert not any(joints[held - 1].velocity)
+    assert np.abs(joints[held].velocity).max() < MARGIN
+
+
+def test_an_emergency_stop_is_told_also_while_nothing_is_streamed(graph, walker):
+    diagnostics = graph.subscribe(DiagnosticArray, "/diagnostics")
+    walker.walk(FAST)
+    assert graph.set_parameters(NODE, Parameter("streaming", value=False))[0].successful
+    walker.wait_for("paused")
+    walker.trigger("emergency_stop")
+    walker.wait_for("emergency_stop")
+    diagnostics.clear()
+    graph.spin_until(lambda: findings(diagnostics, "walk"), "the diagnostics")
+    assert findings(diagnostics, "walk")[0].level == b"\x02"
+    assert graph.set_parameters(NODE, Parameter("streaming", value=True))[0].successful
+    walker.trigger("resume")
+    walker.trigger("resume")
+    walker.wait_for("walking", FAST)
 
 
 def test_an_emergency_stop_is_latched(graph, walker, joints):

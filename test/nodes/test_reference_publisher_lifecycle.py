@@ -4,6 +4,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from nodes.conftest import FAST, SLOW
@@ -52,6 +53,15 @@ def test_a_manager_decides_when_references_are_streamed(graph, start, stocked, t
     assert graph.call(StartRecording, f"{NODE}/start_recording", directory=str(bag)).success
     assert change(graph, Transition.TRANSITION_DEACTIVATE)
     assert describe_bag(bag).is_whole
+    walker.wait_for("inactive")
+    assert walker.states[-1].message == "nothing is streamed, the node is not active"
+    diagnostics = graph.subscribe(DiagnosticArray, "/diagnostics")
+
+    def told():
+        walk = [one for array in diagnostics for one in array.status if one.name == f"{NODE}: walk"]
+        return walk and walk[-1].message == walker.states[-1].message
+
+    graph.spin_until(told, "the diagnostics")
     graph.spin_for(0.3)
     joints.clear()
     graph.spin_for(0.3)

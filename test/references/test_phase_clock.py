@@ -96,6 +96,19 @@ def test_a_new_walk_runs_unless_an_emergency_stop_is_in_force():
     assert clock.motion is Motion.EMERGENCY_STOP
 
 
+def test_a_suspended_walk_comes_to_a_hold_and_goes_on_as_it_was_asked_to():
+    clock = PhaseClock(ramp=0.4)
+    clock.suspended = True
+    assert sum(moved_until_rest(clock)) == pytest.approx(0.2, abs=1e-9)
+    clock.pause()
+    assert clock.resume() is Motion.RUNNING
+    assert clock.advance(1.0).phase == 0
+    clock.restart()
+    assert (clock.at_rest, clock.advance(0.0).rate) == (True, 0.0)
+    clock.suspended = False
+    assert clock.advance(0.1).rate == pytest.approx(smooth_rate(0.25))
+
+
 def test_a_run_is_as_fast_as_the_clock():
     clock = PhaseClock()
     assert [clock.advance(time).phase for time in (5.0, 5.01, 5.03)] == pytest.approx([0.0, 0.01, 0.02])

@@ -15,7 +15,7 @@ from walk_optimizer.nodes.qos import LATCHED, STREAM
 from walk_optimizer.nodes.stream_messages import StreamFormat, StreamMessages
 from walk_optimizer.nodes.streamed_gait import Goal, StreamedGait
 from walk_optimizer.nodes.suite_node import SuiteNode
-from walk_optimizer.nodes.walk_report import WalkReport
+from walk_optimizer.nodes.walk_report import INACTIVE, WalkReport
 from walk_optimizer.phase_clock import PhaseClock
 from walk_optimizer.profile import StepProfile
 from walk_optimizer.stand import StandProfile
@@ -45,7 +45,6 @@ class JointStream:
         self._springs = RecordedTopic(node, KneeSpringMessage, "~/knee_spring", LATCHED, bag)
         self._states = RecordedTopic(node, WalkState, "~/state", LATCHED, bag)
         self._messages = StreamMessages(StreamFormat())
-        self._running = True
         self._report: WalkReport | None = None
         self._pacer: Pacer | None = None
 
@@ -61,14 +60,14 @@ class JointStream:
         return pace if isinstance(pace, StandProfile) else self._known[pace]
 
     @property
-    def report(self) -> WalkReport | None:
-        """What was last published on ~/state."""
-        return self._report
+    def report(self) -> WalkReport:
+        """What the walk is doing."""
+        return INACTIVE if self._pacer is None else self._of_walk()
 
     @property
     def running(self) -> bool:
         """Whether references are to be published."""
-        return self._running
+        return not self._clock.suspended
 
     @property
     def silence(self) -> float:
@@ -102,10 +101,12 @@ class JointStream:
         self._pacer = Pacer(1 / rate, self._tick)
 
     def stop(self) -> None:
-        """Stop publishing."""
-        if self._pacer is not None:
-            self._pacer.stop()
+        """Stop publishing, and say so."""
+        if self._pacer is None:
+            return
+        self._pacer.stop()
         self._pacer = None
+        self._publish_state(INACTIVE, self._node.get_clock().now())
 
     def follow(self, plan: StepPlan, goal: Goal) -> bool:
         """Take a plan from the end of the running step on.
@@ -133,8 +134,8 @@ class JointStream:
             self._pacer.period = 1 / rate
 
     def set_running(self, running: bool) -> None:
-        """Publish, or stand still."""
-        self._running = running
+        """Publish, or come to a hold and be silent then; from there the walk goes on as after a pause."""
+        self._clock.suspended = not running
 
     def set_format(self, form: StreamFormat) -> None:
         """Publish in a format."""
@@ -142,9 +143,7 @@ class JointStream:
         self._messages = StreamMessages(form)
 
     def _tick(self) -> None:
-        """Publish the references of now; called by the pacer's thread."""
-        if not self._running:
-            return
+        """Publish what there is to say now; called by the pacer's thread."""
         try:
             self._publish()
         except Exception as error:  # noqa: BLE001  # the stream must not end because one message failed
@@ -152,26 +151,31 @@ class JointStream:
 
     def _publish(self) -> None:
         now = self._node.get_clock().now()
-        if now.nanoseconds == self._last_ns:
-            return  # A simulation that stands still: nothing new to say.
-        self._last_ns = now.nanoseconds
+        if now.nanoseconds != self._last_ns:  # A simulation that stands still: no new reference.
+            self._last_ns = now.nanoseconds
+            self._move_on(now)
+        self._announce(now)
+        self._bag.rest()
+
+    def _move_on(self, now: Time) -> None:
+        """Move the walk on and publish its references, but none once it is held because none are wanted."""
+        silent = self._clock.suspended and self._clock.at_rest
         # Counted from the begin: a float of the seconds since 1970 resolves a quarter microsecond.
         reference = self.walk.advance((now.nanoseconds - self._begin_ns) * 1e-9)
+        if silent:
+            return
         messages = self._messages
         self._joints.publish(messages.joint_state(reference, now.nanoseconds), now.nanoseconds)
         self._torques.publish(messages.torques(reference), now.nanoseconds)
         self._commands.publish(messages.commands(reference), now.nanoseconds)
-        self._announce(now)
         self._published = time.monotonic()
-        self._bag.rest()
 
     def _announce(self, now: Time) -> None:
         """Publish what is latched where that has changed."""
-        gait = self.gait
-        report = WalkReport.of(self.walk, gait, self._known.get(self.walk.goal))
+        report = self._of_walk()
         if report != self._report:
-            self._states.publish(report.to_message(now.to_msg(), self.walk.step), now.nanoseconds)
-            self._report = report
+            self._publish_state(report, now)
+        gait = self.gait
         if gait is not None and gait.profile is not self._announced:
             self._gaits.publish(gait.message, now.nanoseconds)
             spring = KneeSpringMessage(
@@ -179,3 +183,10 @@ class JointStream:
             )
             self._springs.publish(spring, now.nanoseconds)
             self._announced = gait.profile
+
+    def _of_walk(self) -> WalkReport:
+        return WalkReport.of(self.walk, self.gait, self._known.get(self.walk.goal))
+
+    def _publish_state(self, report: WalkReport, now: Time) -> None:
+        self._states.publish(report.to_message(now.to_msg(), self.walk.step), now.nanoseconds)
+        self._report = report

@@ -43,8 +43,6 @@ class PublisherHealth:
 
     def _walk(self) -> Finding:
         report = self._stream.report
-        if report is None:
-            return Finding(Level.OK, "nothing is streamed yet")
         text = "; ".join(filter(None, (str(report), self._commands.under_way)))
         values = {"state": report.state, "speed": report.speed, "target_speed": report.target_speed}
         if report.state == Motion.EMERGENCY_STOP.value:

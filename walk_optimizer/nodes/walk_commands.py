@@ -28,6 +28,7 @@ _ONCE_RESUMED = {
     Motion.PAUSED: ", once ~/resume is called",
     Motion.EMERGENCY_STOP: ", once ~/resume is called twice",
 }
+_ONCE_STREAMED = ", once `streaming` is true"
 
 
 class EmergencyStopError(WalkOptimizerError):
@@ -247,4 +248,5 @@ class WalkCommands:
     @property
     def _once_resumed(self) -> str:
         """What has to happen before anything moves; empty for nothing."""
-        return _ONCE_RESUMED[self._stream.walk.clock.motion]
+        clock = self._stream.walk.clock
+        return _ONCE_RESUMED[clock.motion] + (_ONCE_STREAMED if clock.suspended else "")

@@ -18,7 +18,9 @@ _SENTENCES = {
     "stopping": "comes to a stand",
     "paused": "holds its pose; call ~/resume to let it go on",
     "emergency_stop": "emergency stop, holds its pose without torques; ~/resume releases, once more goes on",
+    "inactive": "nothing is streamed, the node is not active",
 }
+_SILENT = "holds its pose, and nothing is streamed; set `streaming` to true to let it go on"
 
 
 @dataclass(frozen=True)
@@ -29,11 +31,13 @@ class WalkReport:
         state: A key of the sentences above.
         speed: Of the gait that is walked, or that the running steps lead to, in [m/s]; 0 for a stand.
         target_speed: That comes after it in [m/s].
+        silent: Whether it is paused because nothing is to be streamed.
     """
 
     state: str
     speed: float
     target_speed: float
+    silent: bool = False
 
     @classmethod
     def of(cls, walk: Walk, gait: StreamedGait | None, goal: StreamedGait | None) -> "WalkReport":
@@ -45,11 +49,13 @@ class WalkReport:
             goal: Of its goal; None for a stand.
         """
         speed = 0.0 if gait is None else gait.speed
-        return cls(_state(walk), speed, 0.0 if goal is None else goal.speed)
+        target_speed = 0.0 if goal is None else goal.speed
+        silent = walk.clock.suspended and walk.clock.motion is not Motion.EMERGENCY_STOP
+        return cls(Motion.PAUSED.value if silent else _state(walk), speed, target_speed, silent)
 
     def __str__(self) -> str:
         """Return the sentence, with the target where that differs."""
-        text = _SENTENCES[self.state].format(speed=self.speed)
+        text = (_SILENT if self.silent else _SENTENCES[self.state]).format(speed=self.speed)
         if self.target_speed == self.speed:
             return text
         then = f"{self.target_speed:.4f} m/s" if self.target_speed else "a stand"
@@ -65,6 +71,10 @@ class WalkReport:
             step=step,
             message=str(self),
         )
+
+
+# Before a walk is begun, and after it.
+INACTIVE = WalkReport("inactive", 0.0, 0.0)
 
 
 def _state(walk: Walk) -> str:
