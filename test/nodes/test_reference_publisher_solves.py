@@ -6,6 +6,8 @@ pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Vector3
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from nodes.graph import SETTLING, exists, workers_of
 from nodes.walking import MODE, NODE, standing_walker
 from rclpy.node import Node
@@ -63,6 +65,18 @@ def test_stops_and_emergency_stops_end_the_command_under_way(graph, walker, publ
     )
     # Not one that was let run to its end: its process is gone.
     graph.spin_until(lambda: not any(exists(worker) for worker in workers), "the end of the worker")
+
+
+def test_a_deactivation_ends_the_command_under_way(graph, walker, publisher):
+    walker.walk(SLOWEST)
+    answer = ask_for_a_solve(walker, publisher)
+    workers = workers_of(publisher.process.pid)
+    for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
+        request = Transition(id=transition)
+        assert graph.call(ChangeState, f"{NODE}/change_state", transition=request).success
+    refused = graph.result(answer)
+    assert (refused.success, "was deactivated; activate it and ask again" in refused.message) == (False, True)
+    graph.spin_until(lambda: not any(exists(worker) for worker in workers), "the end of the worker", 30.0)
 
 
 def test_of_two_clients_the_older_one_is_told_at_once_that_a_newer_command_counts(graph, walker, publisher):

@@ -62,15 +62,16 @@ class ReferencePublisherNode(ManagedNode):
         self._bag = StreamBag()
         self._stream = JointStream(self, self._bag, self._phase_clock)
         library = self.connect(GetGait, self.parameters["library_service"])
-        planner = TransitionPlanner(self)
+        self._planner = TransitionPlanner(self)
         self._cycles = CycleMessages()
-        self._commands = WalkCommands(self, self._stream, planner, library, walker)
+        self._commands = WalkCommands(self, self._stream, self._planner, library, walker)
         self._speeds = SpeedCommands(self, self._commands)
         self._recording = RecordingControl(self, self._bag, self._stream)
         health = PublisherHealth(
             self.diagnostics, self._stream, self._commands, self._speeds, library, self._bag
         )
-        for end in (planner.close, self._cycles.close, health.close, self._recording.end, self._stream.stop):
+        planner, cycles = self._planner, self._cycles
+        for end in (planner.close, cycles.close, health.close, self._recording.end, self._stream.stop):
             self._undo.callback(end)
         self.serve(SetGait, "~/set_gait", self._set_gait)
         self.serve(GetJointTrajectory, "~/joint_trajectory", self._joint_trajectory)
@@ -96,8 +97,9 @@ class ReferencePublisherNode(ManagedNode):
         self.get_logger().info("ready")
 
     def deactivate(self) -> None:
-        """Stop the stream and close the bag."""
+        """Stop the stream and what is solved for it, and close the bag."""
         self._speeds.forget()
+        self._planner.give_up()
         self._stream.stop()
         self._recording.close()
 
