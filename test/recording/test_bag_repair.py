@@ -299,14 +299,14 @@ def test_a_bag_without_readable_metadata_is_still_a_bag(tmp_path):
         "",
         "rosbag2_bagfile_information: [",
         "rosbag2_bagfile_information: 3",
-        "[" * 5000,
+        "[" * 1000,
         "&a [*a]",
         f"rosbag2_bagfile_information: {{ros_distro: {'j' * (1 << 22)}}}",
         "rosbag2_bagfile_information: {? [a] : b, ? {} : c}",
     ):
         (bag / "metadata.yaml").write_text(text)
-        assert describe_bag(bag).message_count == 11
-        assert not describe_bag(bag).has_metadata
+        info = describe_bag(bag)
+        assert (info.message_count, info.has_metadata) == (11, False)
     (bag / "metadata.yaml").unlink()
     os.mkfifo(bag / "metadata.yaml")
     assert not describe_bag(bag).has_metadata
