@@ -39,9 +39,7 @@ class JointPeaks:
 
     def __or__(self, other: "JointPeaks") -> "JointPeaks":
         """Return the most that either needs."""
-        return JointPeaks(
-            tuple(map(max, self.torque, other.torque)), tuple(map(max, self.speed, other.speed))
-        )
+        return JointPeaks(_larger(self.torque, other.torque), _larger(self.speed, other.speed))
 
 
 def peaks_of_solved(steps: Iterable[RefinedGait]) -> JointPeaks:
@@ -116,7 +114,7 @@ class JointLimits:
         return JointLimits(_lower(self.torque, former.torque), _lower(self.speed, former.speed))
 
     def require(self, need: JointNeed) -> None:
-        """Refuse steps that need more.
+        """Refuse steps that need more, or what is no finite number, whatever the limits are.
 
         Raises:
             JointLimitError: names each joint that can't do them, what they need and what is allowed.
@@ -129,10 +127,15 @@ class JointLimits:
                 (peaks.speed, self.speed, "rad/s"),
             )
             for joint, needed, limit in zip(JOINTS, peak, limits, strict=True)
-            if needed > limit * (1 + _TOLERANCE)
+            if not (math.isfinite(needed) and needed <= limit * (1 + _TOLERANCE))
         ]
         if excesses:
             raise JointLimitError(f"{need.purpose}, {'; '.join(excesses)}")
+
+
+def _larger(one: Sequence[float], other: Sequence[float]) -> tuple[float, ...]:
+    """Return the larger of two numbers each; one that is not a number stays so, which `max` would drop."""
+    return tuple(np.maximum(one, other).tolist())
 
 
 def _lower(limits: Sequence[float], former: Sequence[float]) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ from library.made_up_gait import made_up_gait, with_refinement
 from rclpy.serialization import deserialize_message, serialize_message
 from walk_optimizer_interfaces.msg import Gait, SolverReport
 
-from walk_optimizer.errors import GaitFileError
+from walk_optimizer.errors import GaitFileError, SolveFailedError
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.conversions import gait_from_message, gait_to_message, request_of_message
 from walk_optimizer.nodes.streamed_gait import ReceivedGait
@@ -104,6 +104,41 @@ def test_a_refined_part_that_does_not_fit_is_refused(change, problem):
     message = gait_to_message(with_refinement(made_up_gait()))
     change(message.refined[0])
     with pytest.raises(GaitFileError) as error:
+        ReceivedGait.from_message(message, WalkerParameters())
+    assert problem in str(error.value)
+
+
+def false_claim(certificate):
+    certificate.violation = [1e9] * len(certificate.violation)
+
+
+def no_number(certificate):
+    certificate.violation = [math.nan] * len(certificate.violation)
+
+
+def nothing_claimed(certificate):
+    for column in ("family", "violation", "tolerance", "unit"):
+        setattr(certificate, column, [])
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (
+            false_claim,
+            "this one is not: dynamics is off by 1e+09 N, allowed is 0.0007; penetration is off by",
+        ),
+        (no_number, "this one is not: dynamics is off by nan N"),
+        (nothing_claimed, "this one is not: its certificate has no entries"),
+    ],
+)
+def test_a_certificate_is_judged_by_its_entries_whatever_it_claims(change, problem):
+    message = gait_to_message(with_refinement(made_up_gait()))
+    change(message.refined[0].certificate)
+    assert message.refined[0].certificate.certified
+    assert ReceivedGait.from_message(message, WalkerParameters()).profile.method == "implicit_euler"
+    change(message.certificate)
+    with pytest.raises(SolveFailedError) as error:
         ReceivedGait.from_message(message, WalkerParameters())
     assert problem in str(error.value)
 

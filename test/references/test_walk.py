@@ -1,13 +1,24 @@
 """Whatever is commanded and whatever the clock does: no jump, and no more torque than the gaits have."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from library.made_up_gait import made_up_gait, with_refinement
 from references.paces import FAST, SLOW, STAND, STANDING, landing_jump
 
 from walk_optimizer.blending import blended
-from walk_optimizer.joint_limits import JointLimitError, JointLimits, JointNeed, peaks_of
+from walk_optimizer.joint_limits import (
+    JointLimitError,
+    JointLimits,
+    JointNeed,
+    JointPeaks,
+    peaks_of,
+    peaks_of_gait,
+)
 from walk_optimizer.phase_clock import PhaseClock
 from walk_optimizer.references import cycle_reference
 from walk_optimizer.walk import DiscontinuousPlanError, StepPlan, Walk
@@ -19,6 +30,7 @@ PEAKS = peaks_of(STEPS)
 FASTEST, STRONGEST = max(PEAKS.speed), max(PEAKS.torque)
 LANDING = max(map(landing_jump, (SLOW, FAST)))
 RAMP, GAP = 0.3, 0.1
+LARGEST = np.finfo(np.float64).max
 
 
 def steepest():
@@ -186,3 +198,24 @@ def test_what_no_joint_can_do_is_refused_with_the_joint_and_both_numbers():
         max(np.abs([FAST.sample(t).qdot[[3, 5]] for t in np.linspace(0, FAST.step_time, 4000)]).max(axis=0)),
         rel=1e-3,
     )
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_what_is_no_finite_number_is_refused_whatever_the_limits_are(number):
+    peaks = peaks_of([FAST])
+    broken = JointPeaks((*peaks.torque[:3], number), peaks.speed)
+    for need in (broken, broken | peaks, peaks | broken):
+        for limits in (JointLimits(), JointLimits(torque=(200.0,) * 4)):
+            with pytest.raises(JointLimitError, match=f"to walk, right_knee needs {number} N m"):
+                limits.require(JointNeed("to walk", need))
+
+
+def test_torques_that_overflow_between_the_nodes_are_refused():
+    gait = with_refinement(made_up_gait())
+    torques = gait.refined.trajectory.torques
+    trajectory = replace(gait.refined.trajectory, torques=torques / np.abs(torques).max() * LARGEST)
+    gait = replace(gait, refined=replace(gait.refined, trajectory=trajectory))
+    with np.errstate(all="ignore"):
+        peaks = peaks_of_gait(gait)
+    with pytest.raises(JointLimitError, match=r"left_knee needs (inf|nan) N m, its limit is inf N m"):
+        JointLimits().require(JointNeed("to walk", peaks))

@@ -45,10 +45,11 @@ class ReceivedGait:
             InvalidRequestError: its spring mode is unknown.
             SolveFailedError: it is not certified.
         """
-        if not message.certificate.certified:
-            raise SolveFailedError("only certified gaits are streamed; this one is not")
         report = SolverReport(status=Status.SOLVED.value)
         gait = gait_from_message(message, report, walker, request_of_message(message))
+        if not gait.certificate.certified:
+            failures = "; ".join(map(str, gait.certificate.failures())) or "its certificate has no entries"
+            raise SolveFailedError(f"only certified gaits are streamed; this one is not: {failures}")
         return cls(message, profile_of(gait), gait)
 
     @property
