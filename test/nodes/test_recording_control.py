@@ -187,7 +187,8 @@ def test_while_a_bag_is_recorded_nothing_but_its_thread_waits_for_the_disk(graph
     disk.hold()
     graph.spin_until(disk.waited_for.is_set, "the disk")
     late = graph.node.create_publisher(Float64, "late", 10)
-    wait_for(graph, heard, DiagnosticStatus.OK, "recording to")
+    graph.spin_until(lambda: finding(heard).level == DiagnosticStatus.WARN, "the long queue", 30.0)
+    assert "messages wait for the disk, from 20000 on they are dropped" in finding(heard).message
     emergency_stop_holds(graph)
     assert "free_mb" in {value.key for value in finding(heard).values}
     disk.release()
@@ -196,6 +197,20 @@ def test_while_a_bag_is_recorded_nothing_but_its_thread_waits_for_the_disk(graph
     graph.spin_for(SETTLING)
     assert graph.call(StopRecording, STOP).success
     assert describe_bag(tmp_path / "bag").counts["/late"] == 1
+
+
+def test_files_of_a_bag_that_would_cost_more_than_they_hold_are_refused(graph, publisher):
+    def answer(name, value):
+        (answer,) = graph.set_parameters(NODE, Parameter(name, value=value))
+        return answer.successful or answer.reason
+
+    size, duration = "recording_file_bytes", "recording_file_duration"
+    expected = "0.001 s is too little for a file; give 1.0 s or more, or 0 for one file"
+    assert answer(duration, 0.001) == f"{duration}: {expected}"
+    expected = "give 1048576 byte or more, or 0 for one file"
+    assert answer(size, 1) == f"{size}: 1 byte is too little for a file; {expected}"
+    for name, allowed in ((duration, 1.0), (duration, 0.0), (size, 1 << 20), (size, 0)):
+        assert answer(name, allowed) is True
 
 
 def test_a_node_that_ends_while_a_bag_is_being_begun_leaves_a_whole_one(graph, disk, publisher, tmp_path):

@@ -25,6 +25,7 @@ from rosbags.interfaces import QosDurability
 from rosbags.rosbag2 import Reader
 
 from walk_optimizer.recording import BagWriter, Compression, RecorderSettings, TopicInfo, describe_bag
+from walk_optimizer.recording import metadata as metadata_module
 from walk_optimizer.recording.errors import (
     BagExistsError,
     BagNotWritableError,
@@ -212,6 +213,32 @@ def test_metadata_exists_from_the_start_and_is_renewed_at_splits(tmp_path):
     assert metadata["message_count"] == 1
     writer.close()
     writer.close()
+
+
+def test_each_split_costs_as_much_as_the_one_before(tmp_path, monkeypatch):
+    """Of the files that are finished nothing is worked out again, however many there are."""
+    described = []
+
+    def describe(entry):
+        described.append(entry.path)
+        return describe_file(entry)
+
+    describe_file = metadata_module._file
+    monkeypatch.setattr(metadata_module, "_file", describe)
+    writer = BagWriter(tmp_path / "1e5: #walk", topics=[JOINTS])
+    costs = []
+    for number in range(20):
+        described.clear()
+        writer.write(JOINTS.name, joint_state(number), START_NS + number * PERIOD_NS)
+        writer.split()
+        costs.append(len(described))
+    writer.close()
+    assert max(costs[2:]) == costs[2] < 10
+    metadata = metadata_of(tmp_path / "1e5: #walk")
+    assert metadata["relative_file_paths"] == [f"1e5: #walk_{number}.mcap" for number in range(21)]
+    assert [entry["path"] for entry in metadata["files"]] == metadata["relative_file_paths"]
+    assert [entry["message_count"] for entry in metadata["files"]] == [1] * 20 + [0]
+    assert describe_bag(tmp_path / "1e5: #walk").is_whole
 
 
 def test_times_may_be_zero_and_out_of_order(tmp_path):

@@ -14,6 +14,8 @@ _MILLISECONDS = 1e3
 _MEGABYTE = 1e6
 # A stream of 1 Hz is the slowest, in [s].
 _LONG_SILENCE = 2.0
+# The part of the recorder's queue beyond which it is no ordinary flush that messages wait for.
+_LONG_QUEUE = 0.1
 
 
 class PublisherHealth:
@@ -112,6 +114,13 @@ class PublisherHealth:
         if status.dropped:
             text = f"{status.dropped} messages are not in the bag: the disk is too slow"
             return Finding(Level.WARN, text, values)
+        limit = recorder.settings.queue_messages
+        if status.queued > _LONG_QUEUE * limit:
+            text = (
+                f"{status.queued} messages wait for the disk, from {limit} on they are dropped: record fewer "
+                "topics, or to a faster disk"
+            )
+            return Finding(Level.WARN, text, values)
         return Finding(Level.OK, f"recording to {status.directory}", values)
 
 
@@ -119,6 +128,7 @@ def _recording_values(status: RecorderStatus) -> dict[str, object]:
     return {
         "directory": status.directory,
         "messages": status.messages,
+        "queued": status.queued,
         "dropped": status.dropped,
         "size_mb": status.size_bytes / _MEGABYTE,
         "free_mb": status.free_bytes / _MEGABYTE,

@@ -1,8 +1,9 @@
 """The parameters of the node `reference_publisher`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.joint_limits import JointLimits, limits_of
 from walk_optimizer.library import Selection
 from walk_optimizer.model.parameters import SpringMode
@@ -18,6 +19,9 @@ CERTIFIED, BLENDED = "certified", "blended"
 
 # A gap of fewer periods of the references than this would be exceeded in the ordinary run.
 LEAST_PERIODS = 2.0
+# Each file of a bag has an end of its own and is brought to the disk: smaller ones cost more than what is in
+# them. In [byte] and [s].
+_LEAST_FILE_BYTES, _LEAST_FILE_DURATION = 1 << 20, 1.0
 
 
 def _check_speed(speed: float) -> None:
@@ -28,6 +32,18 @@ def _check_speed(speed: float) -> None:
 def _check_names(names: Sequence[str]) -> None:
     for name in names:
         require_name(name)
+
+
+def _check_file_limit(least: float, unit: str) -> Callable[[float], None]:
+    """Return what refuses a size or a duration of files that is less than the least, but not 0."""
+
+    def check(value: float) -> None:
+        if 0 < value < least:
+            raise ConfigurationError(
+                f"{value} {unit} is too little for a file; give {least} {unit} or more, or 0 for one file"
+            )
+
+    return check
 
 
 SETTINGS = [
@@ -164,9 +180,21 @@ SETTINGS = [
         "none, zstd or lz4.",
         choices=[entry.value for entry in Compression],
     ),
-    Setting("recording_file_bytes", 0, "A further file is begun at this size; 0 never [byte].", 0, 1 << 62),
     Setting(
-        "recording_file_duration", 0.0, "A further file is begun after this time; 0 never [s].", 0.0, 1e9
+        "recording_file_bytes",
+        0,
+        f"A further file is begun at this size, {_LEAST_FILE_BYTES} or more; 0 never [byte].",
+        0,
+        1 << 62,
+        check=_check_file_limit(_LEAST_FILE_BYTES, "byte"),
+    ),
+    Setting(
+        "recording_file_duration",
+        0.0,
+        f"A further file is begun after this time, {_LEAST_FILE_DURATION:g} or more; 0 never [s].",
+        0.0,
+        1e9,
+        check=_check_file_limit(_LEAST_FILE_DURATION, "s"),
     ),
     Setting(
         "recording_free_bytes",

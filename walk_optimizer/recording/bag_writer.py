@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
@@ -62,6 +62,7 @@ class BagWriter:
         self._topics = {topic.name: topic for topic in topics}
         self._finished: list[FileEntry] = []
         self._finished_bytes = 0
+        self._finished_messages = 0
         self._file: McapFile | None = None
         self._closed = False
         self._reserve = Reserve(directory)
@@ -197,8 +198,9 @@ class BagWriter:
         name = file_name(self.directory.name, len(self._finished))
         file = McapFile(self.directory / name, self.settings, self._reserve)
         try:
-            # It stands again at the end, with the counts; a killed recording has only this one.
-            file.add_metadata(self._metadata(file.entry).to_record())
+            # It stands again at the end, with the counts; a killed recording has only this one. Of the other
+            # files it says nothing: the more there are, the longer each would be.
+            file.add_metadata(self._metadata([file.entry]).to_record())
             for topic in self.topics:
                 file.add_topic(topic)
         except RecordingError:
@@ -209,10 +211,11 @@ class BagWriter:
     def _end_file(self, file: McapFile) -> None:
         self._file = None
         try:
-            file.finish(self._metadata(file.entry).to_record())
+            file.finish(self._metadata([file.entry]).to_record())
         finally:
             self._finished.append(file.entry)
             self._finished_bytes += file.size
+            self._finished_messages += file.messages
 
     def _is_full(self, file: McapFile, log_time_ns: int) -> bool:
         """Whether the next message belongs into a new file, by the rules of rosbag2."""
@@ -225,8 +228,7 @@ class BagWriter:
             return log_time_ns - file.start_time_ns > span
         return False
 
-    def _metadata(self, current: FileEntry | None) -> BagMetadata:
-        entries = [*self._finished, *([current] if current else [])]
+    def _metadata(self, entries: Sequence[FileEntry]) -> BagMetadata:
         return BagMetadata(self.topics, entries, self._ros_distro, self.custom_data)
 
     def _keep_reserve(self, file: McapFile) -> None:
@@ -239,7 +241,8 @@ class BagWriter:
 
     def _write_metadata(self) -> None:
         path = self.directory / METADATA_FILE
-        text = self._metadata(self._file.entry if self._file else None).to_file()
+        entries = [*self._finished, *([self._file.entry] if self._file else [])]
+        text = self._metadata(entries).to_file()
         # It is written to the file and beside it, and its numbers grow longer.
         self._description_bytes = 3 * len(text)
         try:
@@ -248,7 +251,7 @@ class BagWriter:
             raise write_error(path, error) from error
 
     def _count(self, in_open_file: int) -> int:
-        return sum(entry.message_count for entry in self._finished) + in_open_file
+        return self._finished_messages + in_open_file
 
 
 def _create_directory(directory: Path) -> None:

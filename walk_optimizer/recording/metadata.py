@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import yaml
@@ -12,6 +13,8 @@ METADATA_FILE = "metadata.yaml"
 METADATA_VERSION = 9
 STORAGE_IDENTIFIER = "mcap"
 TOP_LEVEL_KEY = "rosbag2_bagfile_information"
+# In C where PyYAML has it: the thread that writes bags competes with the stream for Python's lock.
+_DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
 @dataclass(frozen=True)
@@ -30,10 +33,21 @@ class FileEntry:
     start_time_ns: int | None = None
     end_time_ns: int | None = None
 
-    @property
+    @cached_property
     def message_count(self) -> int:
         """Messages in the file."""
         return sum(self.counts.values())
+
+    # Made once: with every further file of a bag metadata.yaml is written again.
+    @cached_property
+    def path_lines(self) -> str:
+        """What stands for the file in metadata.yaml below `relative_file_paths`."""
+        return _lines({"relative_file_paths": [self.path]}, skip=1)
+
+    @cached_property
+    def lines(self) -> str:
+        """What stands for the file in metadata.yaml below `files`."""
+        return _lines({"files": [_file(self)]}, skip=1)
 
 
 @dataclass(frozen=True)
@@ -42,7 +56,7 @@ class BagMetadata:
 
     Attributes:
         topics: Topics of the bag.
-        files: Files of the bag, in the order of recording.
+        files: Files of the bag, one at least, in the order of recording.
         ros_distro: Name of the ROS distribution that recorded it.
         custom_data: Free texts.
     """
@@ -52,8 +66,19 @@ class BagMetadata:
     ros_distro: str
     custom_data: Mapping[str, str]
 
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the description as rosbag2 lays it out in YAML."""
+    def to_record(self) -> str:
+        """Return the text that rosbag2 keeps inside of an MCAP file, as it lays it out in YAML."""
+        paths, files = [entry.path for entry in self.files], [_file(entry) for entry in self.files]
+        return _dump({**self._head(), "relative_file_paths": paths, "files": files, **self._tail()})
+
+    def to_file(self) -> str:
+        """Return the text of metadata.yaml: the same below a key."""
+        paths = "".join(entry.path_lines for entry in self.files)
+        files = "".join(entry.lines for entry in self.files)
+        lists = f"  relative_file_paths:\n{paths}  files:\n{files}"
+        return f"{TOP_LEVEL_KEY}:\n{_lines(self._head())}{lists}{_lines(self._tail())}"
+
+    def _head(self) -> dict[str, Any]:
         return {
             "version": METADATA_VERSION,
             "storage_identifier": STORAGE_IDENTIFIER,
@@ -63,19 +88,10 @@ class BagMetadata:
             # These two mean whole files that were compressed; chunks say it of themselves.
             "compression_format": "",
             "compression_mode": "",
-            "relative_file_paths": [entry.path for entry in self.files],
-            "files": [_file(entry) for entry in self.files],
-            "custom_data": dict(self.custom_data),
-            "ros_distro": self.ros_distro,
         }
 
-    def to_record(self) -> str:
-        """Return the text that rosbag2 keeps inside of an MCAP file."""
-        return yaml.safe_dump(self.to_mapping(), sort_keys=False)
-
-    def to_file(self) -> str:
-        """Return the text of metadata.yaml."""
-        return yaml.safe_dump({TOP_LEVEL_KEY: self.to_mapping()}, sort_keys=False)
+    def _tail(self) -> dict[str, Any]:
+        return {"custom_data": dict(self.custom_data), "ros_distro": self.ros_distro}
 
     def _topic(self, topic: TopicInfo) -> dict[str, Any]:
         return {
@@ -108,3 +124,12 @@ def _span(entries: Sequence[FileEntry]) -> dict[str, Any]:
 
 def _file(entry: FileEntry) -> dict[str, Any]:
     return {"path": entry.path, **_span([entry]), "message_count": entry.message_count}
+
+
+def _lines(content: Mapping[str, Any], skip: int = 0) -> str:
+    """Return what stands for a mapping in metadata.yaml, without its first lines."""
+    return _dump({TOP_LEVEL_KEY: content}).split("\n", skip + 1)[-1]
+
+
+def _dump(content: Mapping[str, Any]) -> str:
+    return str(yaml.dump(content, Dumper=_DUMPER, sort_keys=False))
