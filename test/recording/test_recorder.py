@@ -4,6 +4,7 @@ import errno
 import logging
 import os
 import resource
+import shutil
 import threading
 import time
 from collections.abc import Callable
@@ -405,6 +406,56 @@ def test_a_split_that_fails_leaves_the_finished_files(tmp_path, monkeypatch):
     writer.close()
     assert [file.path.name for file in describe_bag(tmp_path / "walk").files] == ["walk_0.mcap"]
     assert rosbags_numbers(tmp_path / "walk") == [0]
+
+
+def move(bag: Path) -> None:
+    bag.rename(bag.with_name("moved"))
+
+
+def delete_file(bag: Path) -> None:
+    (bag / "walk_0.mcap").unlink()
+
+
+@pytest.mark.parametrize("flush_period", [0.05, 1e6], ids=["noticed while it records", "noticed at the stop"])
+@pytest.mark.parametrize("take_away", [move, shutil.rmtree, delete_file])
+def test_a_bag_that_is_moved_or_deleted_is_told_and_not_claimed(tmp_path, flush_period, take_away, caplog):
+    recorder = Recorder(tmp_path / "walk", RecorderSettings(min_free_bytes=0, flush_period=flush_period))
+    recorder.add_topic(JOINTS)
+    recorder.start()
+    taken = sum(offer(recorder, number) for number in range(500))
+    wait_until(lambda: recorder.status().messages == 500)
+    take_away(tmp_path / "walk")
+    if flush_period < 1:
+        wait_until(lambda: not recorder.status().recording)
+    status = recorder.stop()
+    assert isinstance(status.error, BagNotWritableError)
+    assert f"{tmp_path / 'walk'} was moved or deleted while it was recorded" in str(status.error)
+    assert str(status.error) in caplog.text
+    assert (status.messages, status.stored_messages, status.size_bytes) == (0, 0, 0)
+    assert status.dropped == taken
+    if take_away is move:
+        report = repair_bag(tmp_path / "moved")
+        assert report.recovered_messages == taken
+
+
+def test_a_disk_that_does_not_tell_its_free_space_is_named(tmp_path):
+    answers = iter([1 << 40])
+
+    def free_space(place: Path) -> int:
+        if (answer := next(answers, None)) is None:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        return answer
+
+    recorder = Recorder(tmp_path / "walk", SMALL_CHUNKS, free_space=free_space)
+    recorder.add_topic(JOINTS)
+    recorder.start()
+    taken = 0
+    while recorder.status().recording:
+        taken += offer(recorder, taken)
+    status = recorder.stop()
+    assert f"Cannot write {tmp_path / 'walk'}: Input/output error; name a folder" in str(status.error)
+    assert status.messages + status.dropped == taken
+    assert describe_bag(tmp_path / "walk").is_whole
 
 
 def test_an_unexpected_failure_of_the_thread_is_reported(tmp_path, monkeypatch):

@@ -156,10 +156,27 @@ class BagWriter:
         return stored
 
     def flush(self) -> None:
-        """Bring what was written to the disk, the open chunk too if the settings say so."""
+        """Bring what was written to the disk, the open chunk too if the settings say so.
+
+        Raises:
+            RecordingError: If the disk refuses, or the bag lies somewhere else by now, or nowhere.
+        """
         file = self._open_file()
+        self.require_in_place()
         file.sync(self.settings.close_chunk_on_flush)
         self._keep_reserve(file)
+
+    def require_in_place(self) -> None:
+        """Refuse to go on with a bag that others have taken away; for a bag that is not closed.
+
+        Raises:
+            BagNotWritableError: If it was moved or deleted.
+        """
+        if not (self._file.in_place if self._file is not None else self.directory.is_dir()):
+            raise BagNotWritableError(
+                f"The bag {self.directory} was moved or deleted while it was recorded; what was moved can be "
+                "saved by `walk-optimizer bag repair`"
+            )
 
     def split(self) -> None:
         """End the current file and begin the next one."""

@@ -92,6 +92,12 @@ class McapFile:
         return self._file.tell()
 
     @property
+    def in_place(self) -> bool:
+        """Whether the open file still lies where it was begun."""
+        with self._writing():
+            return self._file.lies_at(self.path)
+
+    @property
     def entry(self) -> FileEntry:
         """What was written; the open chunk is in it, unless a failed write has lost that."""
         return self.stored if self.broken else self._written()

@@ -55,6 +55,13 @@ class RecordFile:
         """Wait until the disk has the file, so that it survives a loss of power."""
         os.fsync(self._descriptor)
 
+    def lies_at(self, path: Path) -> bool:
+        """Return whether that is this file, and not another one or none."""
+        try:
+            return os.path.samestat(os.fstat(self._descriptor), path.stat())
+        except FileNotFoundError:
+            return False
+
     def close(self) -> None:
         """Close the file."""
         os.close(self._descriptor)

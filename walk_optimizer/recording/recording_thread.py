@@ -160,13 +160,26 @@ class RecordingThread:
         self._take()
         lost = self._taken - self._writer.messages
         self._writer.custom_data[DROPPED_KEY] = str(self._inbox.rejected + lost)
+        in_place = self._is_in_place()
         try:
             self._writer.close()
         except RecordingError as error:
             self.error = self.error or error
-        self._note_progress(lost=self._taken - self._writer.messages)
+        if in_place:
+            self._note_progress(lost=self._taken - self._writer.messages)
+        else:
+            self.progress = Progress(free_bytes=self._free_bytes, lost=self._taken)
         if self.error is not None:
             self._log.error(f"the recording has ended: {self.error}")
+
+    def _is_in_place(self) -> bool:
+        """Return whether the bag, still open, lies where it was begun; if not, that is what went wrong."""
+        try:
+            self._writer.require_in_place()
+        except RecordingError as error:
+            self.error = error
+            return False
+        return True
 
     def _note_progress(self, lost: int = 0) -> None:
         writer = self._writer
