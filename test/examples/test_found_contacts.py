@@ -1,5 +1,7 @@
 """Contacts of a gait on stairs, found without a schedule, and what is said about them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,9 +10,10 @@ from walk_optimizer.contact.schedule import FootMode
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.examples.catalogue import NAMES, solve_example
 from walk_optimizer.examples.finding import Finding, runs
-from walk_optimizer.examples.relaxation import RelaxedSolve
+from walk_optimizer.examples.relaxation import best_of_ways
+from walk_optimizer.examples.relaxed_solve import RelaxedSolve
 from walk_optimizer.examples.terrain_gait import find_contacts, unscheduled_guess
-from walk_optimizer.gait import Certificate
+from walk_optimizer.gait import Certificate, CertificateEntry
 from walk_optimizer.guess import GuessShape
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
@@ -48,6 +51,21 @@ def test_runs_of_contacts_are_told_with_their_times():
         "  torque effort 2.5 (N m)^2 s, 12 iterations, 1.0 s",
         "  iterations by bound on the products: 0.1: 7 (solved), 1e-08: 5 (iteration_limit)",
     ]
+
+
+def test_of_all_ways_the_one_of_least_effort_that_is_certified_is_kept():
+    ends = [(1.0, 2e-3), (4.0, 0.0), (3.0, 0.0), (2.0, 2e-3)]
+    tried = []
+
+    def found(way):
+        effort, residual = ends[len(tried)]
+        tried.append(way)
+        certificate = Certificate((CertificateEntry("dynamics", residual, "N", 1e-3),))
+        nothing = np.zeros((0, 0), dtype=np.int8)
+        return SimpleNamespace(finding=Finding("", (), nothing, 0.1, effort, (), 1.0, certificate))
+
+    assert best_of_ways(found).finding.effort == 3.0
+    assert len({(way.relaxations[0], way.barrier) for way in tried}) == len(ends)
 
 
 def test_an_example_that_does_not_exist_is_refused_with_those_that_do():

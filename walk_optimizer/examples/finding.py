@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from walk_optimizer.contact.schedule import FootMode, Schedule
-from walk_optimizer.examples.relaxation import RelaxedSolve
+from walk_optimizer.examples.relaxed_solve import RelaxedSolve
 from walk_optimizer.gait import Certificate
 
 _WORDS = {
@@ -40,6 +40,11 @@ class Finding:
     solves: tuple[RelaxedSolve, ...]
     seconds: float
     certificate: Certificate
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """What sorts findings: certified ones come first, of them those of less effort."""
+        return not self.certificate.certified, self.effort
 
     @property
     def iterations(self) -> int:

@@ -16,7 +16,7 @@ from walk_optimizer.examples.finger_problem import (
     points_of,
     still_guess,
 )
-from walk_optimizer.examples.relaxation import follow_relaxation
+from walk_optimizer.examples.relaxation import Way, best_of_ways, follow_relaxation
 from walk_optimizer.solve.session import SolveSession
 
 
@@ -39,9 +39,18 @@ class FingerMotion:
 
 def move_disc(finger: Finger, task: FingerTask, session: SolveSession) -> FingerMotion:
     """Return the motion of least torque that moves the disc, from a guess in which nothing moves."""
-    unit = point_units(finger)[U.start] ** 2
+    return best_of_ways(lambda way: _moved(finger, task, way, session))
+
+
+def _moved(finger: Finger, task: FingerTask, way: Way, session: SolveSession) -> FingerMotion:
+    """Return where a way leads."""
+    begin = session.elapsed
     x, solves = follow_relaxation(
-        lambda relaxation: finger_problem(finger, task, relaxation), still_guess(finger, task), session, unit
+        lambda relaxation: finger_problem(finger, task, relaxation),
+        still_guess(finger, task),
+        session,
+        point_units(finger)[U.start] ** 2,
+        way,
     )
     points = points_of(finger, x)
     finding = Finding(
@@ -51,7 +60,7 @@ def move_disc(finger: Finger, task: FingerTask, session: SolveSession) -> Finger
         interval=task.interval,
         effort=float(np.sum(points[U] ** 2) / 2 * task.interval),
         solves=solves,
-        seconds=session.elapsed,
+        seconds=session.elapsed - begin,
         certificate=certify_finger(finger, task, points),
     )
     return FingerMotion(finger, task, points, finding)

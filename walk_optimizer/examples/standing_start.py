@@ -1,6 +1,5 @@
 """The walker sets off from standing feet: which foot it lifts, and when, is for the optimiser to find."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -12,12 +11,8 @@ from walk_optimizer.certificate import certify_from
 from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.examples.finding import Finding
 from walk_optimizer.examples.free_end import free_end_functions
-from walk_optimizer.examples.relaxation import (
-    LAST_RELAXATIONS,
-    RELAXATIONS,
-    RelaxedSolve,
-    follow_relaxation,
-)
+from walk_optimizer.examples.relaxation import Way, best_of_ways, follow_relaxation
+from walk_optimizer.examples.relaxed_solve import RelaxedSolve
 from walk_optimizer.gait import Certificate, CertificateEntry, Trajectory
 from walk_optimizer.guess import leg_angles, resampled
 from walk_optimizer.model.kinematics import HIP_X, HIP_Y
@@ -143,14 +138,19 @@ def still_guess(walker: WalkerParameters, task: StandingStart) -> FloatArray:
 
 
 def set_off(walker: WalkerParameters, task: StandingStart, session: SolveSession) -> StandingMotion:
-    """Return the motion of least torque that sets the walker off.
+    """Return the motion of least torque that sets the walker off."""
+    return best_of_ways(lambda way: _set_off(walker, task, way, session))
 
-    The contacts are found on a coarse grid; its solution starts the grid that was asked for.
-    """
+
+def _set_off(
+    walker: WalkerParameters, task: StandingStart, way: Way, session: SolveSession
+) -> StandingMotion:
+    """Return where a way leads: contacts are found on a coarse grid, whose solution starts the other."""
+    begin = session.elapsed
     coarse = replace(task, points=task.coarse_points)
-    guess, found = _followed(walker, coarse, still_guess(walker, coarse), RELAXATIONS, session)
+    guess, found = _followed(walker, coarse, still_guess(walker, coarse), way, session)
     guess = resampled(guess, task.points)
-    points, solves = _followed(walker, task, guess, LAST_RELAXATIONS, session)
+    points, solves = _followed(walker, task, guess, way.last, session)
     trajectory = Trajectory.from_stacked(points, task.duration)
     finding = Finding(
         title=f"The walker sets off from standing feet: {task.distance:g} m in {task.duration:g} s",
@@ -159,7 +159,7 @@ def set_off(walker: WalkerParameters, task: StandingStart, session: SolveSession
         interval=task.grid.interval,
         effort=trajectory.torque_cost * task.grid.interval,
         solves=found + solves,
-        seconds=session.elapsed,
+        seconds=session.elapsed - begin,
         certificate=certify_standing(walker, task, trajectory),
     )
     return StandingMotion(walker, task, trajectory, finding)
@@ -169,7 +169,7 @@ def _followed(
     walker: WalkerParameters,
     task: StandingStart,
     guess: FloatArray,
-    relaxations: Sequence[float],
+    way: Way,
     session: SolveSession,
 ) -> tuple[FloatArray, tuple[RelaxedSolve, ...]]:
     """Return the points (23, N) in SI units that the relaxed solves lead to, and these."""
@@ -178,7 +178,7 @@ def _followed(
         to_scaled(walker, guess, KneeSpring()),
         session,
         torque_unit(walker) ** 2,
-        relaxations,
+        way,
     )
     return from_scaled(walker, x)[0], solves
 

@@ -1,6 +1,5 @@
 """A gait on a slope or stairs whose contacts nobody gives: both feet carry the walker in the guess."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from walk_optimizer.certificate import certify, landing_distance
 from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.examples.finding import Finding
-from walk_optimizer.examples.relaxation import RELAXATIONS, follow_relaxation
+from walk_optimizer.examples.relaxation import Way, best_of_ways, follow_relaxation
 from walk_optimizer.gait import Trajectory
 from walk_optimizer.guess import FloatArray, GuessShape, kinematic_guess
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
@@ -47,19 +46,15 @@ def unscheduled_guess(walker: WalkerParameters, request: GaitRequest, shape: Gue
 def find_contacts(
     walker: WalkerParameters, request: GaitRequest, shape: GuessShape, session: SolveSession
 ) -> TerrainGait:
-    """Return the better periodic gait of two that complementarity alone leads to.
-
-    They differ in how far the problem is relaxed at first. One whose certificate fails comes last.
-    """
-    gaits = [_found(walker, request, shape, RELAXATIONS[skipped:], session) for skipped in (0, 1)]
-    return min(gaits, key=lambda one: (not one.finding.certificate.certified, one.finding.effort))
+    """Return the best periodic gait that complementarity alone leads to."""
+    return best_of_ways(lambda way: _found(walker, request, shape, way, session))
 
 
 def _found(
     walker: WalkerParameters,
     request: GaitRequest,
     shape: GuessShape,
-    relaxations: Sequence[float],
+    way: Way,
     session: SolveSession,
 ) -> TerrainGait:
     begin = session.elapsed
@@ -68,7 +63,7 @@ def _found(
         to_scaled(walker, unscheduled_guess(walker, request, shape), KneeSpring()),
         session,
         torque_unit(walker) ** 2,
-        relaxations,
+        way,
     )
     points, spring = from_scaled(walker, x)
     trajectory = Trajectory.from_stacked(points, request.step_time)

@@ -78,10 +78,15 @@ def _settings(options: SolveOptions) -> dict[str, Any]:
     return settings | _strategy(options.barrier)
 
 
-def _strategy(barrier: float | None) -> dict[str, Any]:
+def far_strategy(barrier: float) -> dict[str, str | float]:
+    """Return how the barrier parameter goes down from `barrier` for a start that may be far away."""
+    return {"mu_strategy": "monotone", "mu_init": barrier, "expect_infeasible_problem": "yes"}
+
+
+def _strategy(barrier: float | None) -> dict[str, str | float]:
     """Return how the barrier parameter begins and goes down: from `barrier`, None for a far start."""
     if barrier is None:
-        return {"mu_strategy": "monotone", "mu_init": _FAR_BARRIER, "expect_infeasible_problem": "yes"}
+        return far_strategy(_FAR_BARRIER)
     push = min(_LARGEST_PUSH, 10 * barrier)
     return {
         "mu_strategy": "adaptive",
