@@ -12,6 +12,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Twist, Vector3
 from nodes.graph import SETTLING
@@ -22,6 +23,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 from walk_optimizer_interfaces.msg import WalkState
@@ -286,6 +288,39 @@ def test_after_a_full_disk_another_folder_is_recorded_to(graph, publisher, tmp_p
     assert graph.call(StopRecording, STOP).success
     (bag,) = (tmp_path / "other").iterdir()
     assert describe_bag(bag).is_whole
+
+
+def test_nothing_is_recorded_before_simulated_time_begins_and_nothing_latched_is_missed(
+    graph, publisher, tmp_path
+):
+    """Without a clock all times are 0: a bag from 1970 to now would play for decades."""
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    graph.node.create_publisher(Float64, "latched", latched).publish(Float64(data=7.0))
+    parameters = {"use_sim_time": True, "recording_topics": ["latched", "/diagnostics"]}
+    graph.set_parameters(NODE, *(Parameter(name, value=value) for name, value in parameters.items()))
+    heard = graph.subscribe(DiagnosticArray, "/diagnostics")
+    speeds = graph.publisher(Float64, f"{NODE}/target_speed", latched)
+    assert graph.call(StartRecording, START, directory=str(tmp_path / "bag")).success
+    wait_for(graph, heard, DiagnosticStatus.OK, "recording to")
+    speeds.publish(Float64(data=-1.0))
+    graph.spin_for(SETTLING)
+    clock, began = graph.publisher(Clock, "/clock"), 1_700_000_000
+    for tick in range(250):
+        clock.publish(Clock(clock=Time(sec=began + tick // 100, nanosec=tick % 100 * 10_000_000)))
+        graph.spin_for(0.01)
+    assert graph.call(StopRecording, STOP).success
+    info = describe_bag(tmp_path / "bag")
+    assert began <= info.start_time_ns * 1e-9 < began + 3
+    assert info.duration_ns < 3e9
+    recorded = set(+info.counts)
+    assert {f"/{NODE}/state", f"/{NODE}/joint_reference", "/latched", "/diagnostics"} <= recorded
+    with AnyReader([tmp_path / "bag"]) as reader:
+        stamps = [
+            reader.deserialize(data, one.msgtype).stamp.sec
+            for one, _, data in reader.messages()
+            if one.topic == f"/{NODE}/state"
+        ]
+    assert min(stamps) >= began
 
 
 def test_commands_are_recorded_as_the_node_got_them_refused_ones_too(graph, publisher, tmp_path):

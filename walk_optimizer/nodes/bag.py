@@ -47,6 +47,21 @@ def named_folder(name: str) -> Path:
         raise BagNotWritableError(f"Cannot write {name}: no such home; name another folder") from error
 
 
+def record(recorder: Recorder, topic: str, data: bytes, time_ns: int) -> None:
+    """Have a message recorded, unless no time is known yet.
+
+    Simulated time is 0 until the first message on /clock: a bag from then to now would last for decades.
+
+    Args:
+        recorder: That takes it.
+        topic: Full name.
+        data: The serialised message.
+        time_ns: When, by the node's clock, in [ns].
+    """
+    if time_ns > 0:
+        recorder.write(topic, data, time_ns)
+
+
 class RecordedTopic:
     """A publisher and what a bag says about its topic."""
 
@@ -69,7 +84,7 @@ class RecordedTopic:
         data = message if isinstance(message, bytes) else serialize(message)
         self._publisher.publish(data)
         if recorder is not None:
-            recorder.write(self.info.name, data, max(time_ns, 0))
+            record(recorder, self.info.name, data, time_ns)
 
 
 class ReceivedTopic:
@@ -96,7 +111,7 @@ class ReceivedTopic:
             recorder.add_topic(self._offered())
             self._announced_to = recorder
         now = self._node.get_clock().now().nanoseconds
-        recorder.write(self.info.name, serialize(message), max(now, 0))
+        record(recorder, self.info.name, serialize(message), now)
 
     def _offered(self) -> TopicInfo:
         """Return the topic with what its publishers offer; if they have gone, with what is asked of them."""

@@ -10,6 +10,7 @@ from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.type_support import check_for_type_support
 
+from walk_optimizer.nodes.bag import record
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.recording import Recorder, TopicInfo
 from walk_optimizer.recording.definitions import message_definition, type_hash
@@ -60,6 +61,8 @@ class ForeignTopics:
         self._closed = True
 
     def _look(self) -> None:
+        if self._node.get_clock().now().nanoseconds <= 0:
+            return  # What is latched arrives with the subscription, and could not be recorded yet.
         for name in sorted(self.missing):
             publishers = self._node.get_publishers_info_by_topic(name)
             if publishers:
@@ -91,7 +94,7 @@ class ForeignTopics:
 
     def _taker(self, name: str) -> Callable[[bytes], None]:
         def take(data: bytes) -> None:
-            self.recorder.write(name, data, max(self._node.get_clock().now().nanoseconds, 0))
+            record(self.recorder, name, data, self._node.get_clock().now().nanoseconds)
 
         return take
 

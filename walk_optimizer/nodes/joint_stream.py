@@ -152,6 +152,8 @@ class JointStream:
     def _publish(self) -> None:
         now = self._node.get_clock().now()
         if now.nanoseconds != self._last_ns:  # A simulation that stands still: no new reference.
+            if self._last_ns == 0:
+                self.announce_again()  # Simulated time begins: what was said before it is in no bag.
             self._last_ns = now.nanoseconds
             self._move_on(now)
         self._announce(now)
