@@ -4,6 +4,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -197,6 +198,15 @@ def test_a_file_can_be_named_instead(tmp_path, cached):
     done = walk_optimizer("export", "--file", path, "--output", output, home=tmp_path)
     assert (done.returncode, done.stdout) == (0, f"exported to {output}\n")
     assert output.read_text() == gait_csv(cached)
+
+
+def test_the_pipe_of_the_help_reads_as_many_rows_as_there_are_points(tmp_path, cached):
+    program = re.search(r'python3 -c \\\n *"(.*)"', walk_optimizer("export", "--help", home=tmp_path).stdout)
+    exported = walk_optimizer("export", "--speed", OFF_TABLE, "--spring", "stiffness", home=tmp_path).stdout
+    read = subprocess.run(
+        [sys.executable, "-c", program[1]], input=exported, capture_output=True, text=True, check=True
+    )
+    assert read.stdout == "(200, 24)\n"
 
 
 def test_the_refined_part_is_exported_at_its_nodes(tmp_path, cached):

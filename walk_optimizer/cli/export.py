@@ -28,7 +28,7 @@ _EPILOG = """\
 examples:
   walk-optimizer export --speed 1.15km/h --spring stiffness --output gait.csv
   walk-optimizer export --speed 0.3185 | python3 -c \\
-        "import sys, numpy; print(numpy.genfromtxt(sys.stdin, delimiter=',').shape)"
+        "import sys, numpy; print(numpy.genfromtxt(sys.stdin, delimiter=',')[1:].shape)"
 """
 
 
