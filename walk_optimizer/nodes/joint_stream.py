@@ -62,7 +62,7 @@ class JointStream:
     @property
     def report(self) -> WalkReport:
         """What the walk is doing."""
-        return INACTIVE if self._pacer is None else self._of_walk()
+        return INACTIVE if self._pacer is None else self._of_walk(self.gait)
 
     @property
     def running(self) -> bool:
@@ -174,10 +174,10 @@ class JointStream:
 
     def _announce(self, now: Time) -> None:
         """Publish what is latched where that has changed."""
-        report = self._of_walk()
+        gait = self.gait
+        report = self._of_walk(gait)
         if report != self._report:
             self._publish_state(report, now)
-        gait = self.gait
         if gait is not None and gait.profile is not self._announced:
             self._gaits.publish(gait.message, now.nanoseconds)
             spring = KneeSpringMessage(
@@ -186,8 +186,9 @@ class JointStream:
             self._springs.publish(spring, now.nanoseconds)
             self._announced = gait.profile
 
-    def _of_walk(self) -> WalkReport:
-        return WalkReport.of(self.walk, self.gait, self._known.get(self.walk.goal))
+    def _of_walk(self, gait: StreamedGait | None) -> WalkReport:
+        """Return what the walk is doing, whose gait that is."""
+        return WalkReport.of(self.walk, gait, self._known.get(self.walk.goal))
 
     def _publish_state(self, report: WalkReport, now: Time) -> None:
         self._states.publish(report.to_message(now.to_msg(), self.walk.step), now.nanoseconds)

@@ -225,16 +225,21 @@ class SpeedCommands:
         self._node.get_logger().warning(f"target speed refused: {error}", throttle_duration_sec=1.0)
 
     def _settle(self) -> None:
-        """Take note that what was asked for last is carried out; if that is no stream, watch no more."""
+        """Take note that what was asked for last is carried out."""
         self.watch.followed()
-        if self._timer is not None and not self.watch.active:
-            self._node.destroy_timer(self._timer)
-            self._timer = None
+        self._look_no_more()
 
     def _refuse(self) -> None:
         """Take note that what was asked for last is refused: a stream before it may be stale by now."""
         self.watch.refused()
         self._look()
+        self._look_no_more()
+
+    def _look_no_more(self) -> None:
+        """End the looking where there is no stream to look at."""
+        if self._timer is not None and not self.watch.active:
+            self._node.destroy_timer(self._timer)
+            self._timer = None
 
     def _look(self) -> None:
         """Stop the walk when a stream of speeds has fallen silent."""

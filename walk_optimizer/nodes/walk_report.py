@@ -50,7 +50,8 @@ class WalkReport:
         """
         speed = 0.0 if gait is None else gait.speed
         target_speed = 0.0 if goal is None else goal.speed
-        silent = walk.clock.suspended and walk.clock.motion is not Motion.EMERGENCY_STOP
+        clock = walk.clock
+        silent = clock.suspended and clock.motion is not Motion.EMERGENCY_STOP
         return cls(Motion.PAUSED.value if silent else _state(walk), speed, target_speed, silent)
 
     def __str__(self) -> str:
