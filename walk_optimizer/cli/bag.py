@@ -62,9 +62,9 @@ def add_parser(verbs: Subparsers) -> None:
     play.add_argument(
         "--delay",
         type=float,
-        default=3.0,
+        default=4.0,
         metavar="SECONDS",
-        help="time for subscribers to find the player, 3 at the least (default: %(default)s)",
+        help="time for subscribers to find the player, 4 at the least (default: %(default)s)",
     )
     play.add_argument("--loop", action="store_true", help="begin anew at the end, until Ctrl-C")
     play.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these (default: all)")
