@@ -207,7 +207,7 @@ def test_the_stream_goes_on_when_the_disk_is_full(graph, own, tmp_path):
     largest = 200_000
     resource.prlimit(own.process.process.pid, resource.RLIMIT_FSIZE, (largest, largest))
     diagnostics = graph.subscribe(DiagnosticArray, "/diagnostics")
-    graph.set_parameters(NODE, Parameter("recording_free_bytes", value=0), Parameter("rate", value=500.0))
+    graph.set_parameters(own.node, Parameter("recording_free_bytes", value=0), Parameter("rate", value=500.0))
     joints = record(own, tmp_path / "bag", 0.0)
 
     def told():
