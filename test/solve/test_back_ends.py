@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import signal
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -55,6 +56,19 @@ def test_a_session_solves_with_the_back_end_of_its_settings():
     solution = session.solve(problem, start, "search", objective_unit=1.0)
     assert solution.solved
     assert solution.detail == "return status 0", "these are fatrop's words, not IPOPT's"
+
+
+def test_a_failure_within_uno_is_a_status_and_no_crash(monkeypatch):
+    def broken(**_):
+        raise RuntimeError("An exception was raised in the solver.")
+
+    watcher = SimpleNamespace(begin=lambda *_: None, end=lambda: None, verdict=None, iteration=-1)
+    instance = SimpleNamespace(solver=broken, watcher=watcher)
+    monkeypatch.setattr(uno, "_instances", SimpleNamespace(of=lambda *_: instance))
+    solution = uno.solve(rosenbrock(), START, SolveOptions())
+    assert (solution.status, solution.iterations) == (Status.SOLVER_ERROR, 0)
+    np.testing.assert_array_equal(solution.x, START)
+    assert solution.objective == pytest.approx(24.2)
 
 
 def test_what_uno_says_becomes_a_status():

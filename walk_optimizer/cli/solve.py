@@ -36,7 +36,8 @@ examples:
   walk-optimizer solve --speed 0.3185
   walk-optimizer solve --speed 1.15km/h --spring stiffness_and_equilibrium --save
   walk-optimizer solve --speed 0.5 --points 400 --time-limit 60 --export gait.csv
-  walk-optimizer solve --speed 0.5 --points 50 --solver uno
+  walk-optimizer solve --speed 0.5 --points 50 --solver fatrop
+        with another solver; takes half a minute, most of it for the refinement
   walk-optimizer solve --speed 1.15km/h --points 50 --formulation report
         what became of the report's own program: residuals, no gait unless certified"""
 
@@ -51,7 +52,12 @@ def add_parser(verbs: Subparsers) -> None:
     add_library(parser)
     parser.add_argument("--time-limit", metavar="SECONDS", help="give up after this time")
     known = ", ".join(f"{name} ({entry.method})" for name, entry in BACK_ENDS.items())
-    parser.add_argument("--solver", metavar="NAME", help=f"{known}; default: that of config/solver.yaml")
+    parser.add_argument(
+        "--solver",
+        metavar="NAME",
+        help=f"{known}; default: that of config/solver.yaml. uno is for coarse grids: refinements, whose "
+        "grid is not, take it minutes",
+    )
     parser.add_argument(
         "--formulation",
         choices=_FORMULATIONS,

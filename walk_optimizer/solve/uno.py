@@ -128,6 +128,10 @@ def solve(
             lbg=problem.lower_g,
             ubg=problem.upper_g,
         )
+    except RuntimeError:
+        # Uno gives up by an exception where its quadratic programs fail, and tells no iterate then.
+        status = instance.watcher.verdict or Status.SOLVER_ERROR
+        return ended(problem, start, status, max(instance.watcher.iteration, 0), "an exception within Uno")
     finally:
         instance.watcher.end()
     statistics = instance.solver.stats()
