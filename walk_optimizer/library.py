@@ -17,7 +17,7 @@ from walk_optimizer.gait_files import (
     transition_name_parts,
     write_gait_file,
 )
-from walk_optimizer.gait_files.access import writable_folder
+from walk_optimizer.gait_files.access import files_in, writable_folder
 from walk_optimizer.gait_files.codec import encode
 from walk_optimizer.library_entries import GaitSummary, LibraryEntry, Source, summarize, table_order
 from walk_optimizer.library_selection import (
@@ -54,13 +54,16 @@ def existing_folder(folder: Path | str) -> Path:
     """Return a folder that was named; a misspelt one must not pass for one that holds nothing.
 
     Raises:
-        GaitFileError: it is missing, or no folder.
+        GaitFileError: it is missing, no folder, or out of reach.
     """
     folder = Path(folder)
-    if folder.is_dir():
-        return folder
-    if folder.exists():
-        raise GaitFileError(f"{folder}: the folder is a file; name another")
+    try:
+        if folder.is_dir():
+            return folder
+        if folder.exists():
+            raise GaitFileError(f"{folder}: the folder is a file; name another")
+    except OSError as error:
+        raise GaitFileError(f"{folder}: the folder can't be read: {error.strerror}") from error
     raise GaitFileError(f"{folder}: the folder is missing; create it or name another")
 
 
@@ -105,11 +108,17 @@ class GaitLibrary:
         """Read both folders again."""
         found: list[LibraryEntry] = []
         problems: list[str] = []
-        for path, source in _gait_files(self.walker, self.folder):
+        for folder, source in self._places():
             try:
-                found.append(_read_entry(path, source, self.walker))
+                paths = _gait_files(folder)
             except GaitFileError as error:
                 problems.append(str(error))
+                continue
+            for path in paths:
+                try:
+                    found.append(_read_entry(path, source, self.walker))
+                except GaitFileError as error:
+                    problems.append(str(error))
         self._found = found
         self._entries = _best(found)
         self._problems = tuple(problems)
@@ -198,23 +207,20 @@ class GaitLibrary:
         self._problems = tuple(text for text in self._problems if not text.startswith(f"{path}:"))
         return path
 
+    def _places(self) -> list[tuple[Path, Source]]:
+        """Return the folders to look at: the packaged table's for the packaged walker, and the own one."""
+        own = (self.folder, Source.CACHE)
+        return [(table_folder(), Source.TABLE), own] if self.walker == WalkerParameters.from_yaml() else [own]
+
     def _serve(self, gait: Gait, path: Path) -> None:
         others = [entry for entry in self._found if entry.path != path]
         self._found = [*others, LibraryEntry(gait, Source.CACHE, path)]
         self._entries = _best(self._found)
 
 
-def _gait_files(walker: WalkerParameters, folder: Path) -> list[tuple[Path, Source]]:
-    """Return the files to look at: the packaged table's for the packaged walker, and the folder's."""
-    places = [(folder, Source.CACHE)]
-    if walker == WalkerParameters.from_yaml():
-        places.insert(0, (table_folder(), Source.TABLE))
-    return [
-        (path, source)
-        for place, source in places
-        for path in sorted(place.glob(f"*{SUFFIX}"))
-        if not path.name.startswith(".") and transition_name_parts(path.name) is None
-    ]
+def _gait_files(folder: Path) -> list[Path]:
+    """Return the files of gaits in a folder; raise GaitFileError when it can't be read."""
+    return [path for path in files_in(folder, SUFFIX) if transition_name_parts(path.name) is None]
 
 
 def _read_entry(path: Path, source: Source, walker: WalkerParameters) -> LibraryEntry:

@@ -348,3 +348,15 @@ def test_threads_that_store_and_find_do_not_disturb_each_other(table, folder):
     for thread in threads:
         thread.join()
     assert failures == []
+
+
+@pytest.mark.parametrize(("kind", "count"), [(GaitLibrary, 21), (TransitionTable, 78)])
+def test_a_cache_that_can_not_be_read_is_told_and_the_packaged_files_are_served(
+    tmp_path, monkeypatch, kind, count
+):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "a file"))
+    (tmp_path / "a file").touch()
+    found = kind(WalkerParameters.from_yaml())
+    (problem,) = found.problems()
+    assert problem == f"{found.folder}: the folder can't be read: Not a directory"
+    assert len(found.gaits() if kind is GaitLibrary else found.names()) == count

@@ -11,6 +11,25 @@ from walk_optimizer.errors import GaitFileError, GaitNotWritableError, shortened
 from walk_optimizer.resources import sync_directory
 
 
+def files_in(folder: Path, suffix: str) -> list[Path]:
+    """Return the files of a folder that end in a suffix, by name and without hidden ones.
+
+    Args:
+        folder: Where to look; where there is none, there are no files.
+        suffix: Of the files.
+
+    Raises:
+        GaitFileError: the folder can't be read.
+    """
+    try:
+        paths = sorted(folder.iterdir())
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise GaitFileError(f"{folder}: the folder can't be read: {error.strerror}") from error
+    return [path for path in paths if path.name.endswith(suffix) and not path.name.startswith(".")]
+
+
 def read_limited(path: Path, largest: int) -> bytes:
     """Return the content of a regular file.
 

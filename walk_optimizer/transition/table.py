@@ -9,7 +9,7 @@ import numpy as np
 
 from walk_optimizer.errors import GaitFileError, GaitNotFoundError
 from walk_optimizer.gait_files import SUFFIX
-from walk_optimizer.gait_files.access import writable_folder
+from walk_optimizer.gait_files.access import files_in, writable_folder
 from walk_optimizer.library import cache_folder as gait_cache_folder
 from walk_optimizer.library import existing_folder
 from walk_optimizer.model.parameters import WalkerParameters
@@ -64,7 +64,12 @@ class TransitionTable:
         self._files: dict[TransitionName, tuple[Path, ...]] = {}
         self._problems: dict[Path, str] = {}
         for place in (table_folder(), self.folder):
-            for path in sorted(place.glob(f"*{SUFFIX}")):
+            try:
+                paths = files_in(place, SUFFIX)
+            except GaitFileError as error:
+                self._problems[place] = str(error)
+                continue
+            for path in paths:
                 name = TransitionName.parse(path, walker)
                 if name is not None:
                     self._files[name] = (path, *self._files.get(name, ()))
