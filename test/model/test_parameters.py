@@ -50,6 +50,19 @@ def test_what_is_no_number_is_refused_by_name(name, value):
     assert f"{name} is {value!r}, expected a number" in str(refusal.value)
 
 
+def test_a_terrain_is_one():
+    with pytest.raises(ConfigurationError, match=r"terrain is \{'slope': 0\.1\}, expected a Terrain"):
+        WalkerParameters(terrain={"slope": 0.1})
+    with pytest.raises(ConfigurationError, match="terrain is None, expected a Terrain"):
+        WalkerParameters(terrain=None)
+
+
+def test_a_file_may_be_named_by_a_text(tmp_path):
+    file = tmp_path / "moon.yaml"
+    file.write_text("gravity: 1.62\n")
+    assert WalkerParameters.from_yaml(str(file)) == WalkerParameters(gravity=1.62)
+
+
 def test_hips_turn_by_half_a_turn_at_most():
     assert WalkerParameters(hip_angle_limit=math.pi).hip_angle_limit == math.pi
     with pytest.raises(ConfigurationError, match=r"hip_angle_limit is 3\.2 rad, allowed is up to pi"):

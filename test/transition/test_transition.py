@@ -175,8 +175,18 @@ def test_requests_that_make_no_sense_are_refused(walker, stand, gaits):
     for arguments, options, text in (
         ((walker, stand, stand), {}, "both are stands"),
         ((walker, stand, gait), {"steps": 0}, "steps is 0, allowed is 1 to 4"),
-        ((walker, stand, gait), {"torque_limit": 0.0}, r"torque limit is 0\.0 N m, allowed is above 0"),
+        (
+            (walker, stand, gait),
+            {"torque_limit": 0.0},
+            r"torque limit is 0\.0 N m, allowed is a number above 0",
+        ),
         ((walker, stand, gait), {"torque_limit": (9.0, -1.0)}, r"limit is \(9\.0, -1\.0\) N m, allowed is"),
+        (
+            (walker, stand, gait),
+            {"torque_limit": (1, 2, 3)},
+            r"limit is \(1, 2, 3\) N m, allowed is a number",
+        ),
+        ((walker, stand, gait), {"torque_limit": "9"}, "limit is '9' N m, allowed is a number above 0, or"),
         ((walker, stand, gait), {"time_limit": -1.0}, r"time limit is -1\.0 s, allowed is above 0"),
         ((walker, stand, replace(gait, refined=None)), {}, "no certified refined part"),
         ((uphill, stand, gait), {}, "level ground"),

@@ -102,6 +102,10 @@ class WalkerParameters:
             if entry.name != "terrain":
                 value = _finite(entry.name, getattr(self, entry.name), zero=entry.name in MARGINS)
                 object.__setattr__(self, entry.name, value)
+        if not isinstance(self.terrain, Terrain):
+            raise ConfigurationError(
+                f"walker parameter terrain is {quoted(self.terrain)}, expected a Terrain"
+            )
         if abs(self.terrain.step_up) >= self.leg_length:
             raise ConfigurationError(
                 f"terrain step_up is {self.terrain.step_up} m, allowed is less than the leg's "
@@ -118,13 +122,13 @@ class WalkerParameters:
             )
 
     @classmethod
-    def from_yaml(cls, path: Path | None = None) -> "WalkerParameters":
+    def from_yaml(cls, path: Path | str | None = None) -> "WalkerParameters":
         """Read the parameters from a YAML file, by default the packaged `config/walker.yaml`.
 
         Raises:
             ConfigurationError: the file can't be read, or an entry is unknown or impossible.
         """
-        source = path or config_file("walker.yaml")
+        source = config_file("walker.yaml") if path is None else Path(path)
         entries = read_yaml(source)
         known = {entry.name for entry in fields(cls)}
         unknown = sorted(set(entries) - known)

@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.errors import InvalidRequestError, quoted
 from walk_optimizer.gait import RefinedGait
 from walk_optimizer.refined_peaks import torque_peaks
 
@@ -19,12 +19,15 @@ def hip_and_knee(limit: TorqueLimit) -> tuple[float, float]:
     """Return the limit of the hips and that of the knees in [N m]; both may be infinite.
 
     Raises:
-        InvalidRequestError: one of them is not above 0.
+        InvalidRequestError: they are not one or two numbers, or one of them is not above 0.
     """
-    hip, knee = limit if isinstance(limit, tuple) else (limit, limit)
-    if not (hip > 0 and knee > 0):
-        raise InvalidRequestError(f"torque limit is {limit} N m, allowed is above 0")
-    return hip, knee
+    both = limit if isinstance(limit, tuple) else (limit, limit)
+    if len(both) != 2 or not all(isinstance(one, int | float | np.number) and one > 0 for one in both):
+        raise InvalidRequestError(
+            f"torque limit is {quoted(limit)} N m, allowed is a number above 0, or that of the hips and that "
+            "of the knees"
+        )
+    return both
 
 
 def each_torque(limit: TorqueLimit) -> FloatArray:
