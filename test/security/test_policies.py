@@ -10,10 +10,12 @@ import pytest
 pytest.importorskip("rclpy")
 pytest.importorskip("tf2_msgs")
 
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist
 from nodes.graph import PATIENCE, SETTLING
 from rclpy.action import get_action_server_names_and_types_by_node
 from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
 from security.policies import enclaves
 from std_msgs.msg import Float64
 from tf2_msgs.msg import TFMessage
@@ -77,16 +79,23 @@ def require_exactly_what_it_does(graph, enclave, node):
         assert differences() == {}
 
 
+@pytest.fixture
+def clock(graph):
+    """Simulated time that has begun, without which nothing is recorded, and stands still."""
+    publisher = graph.node.create_publisher(Clock, "/clock", 1)
+    graph.node.create_timer(0.1, lambda: publisher.publish(Clock(clock=Time(sec=1))))
+
+
 @pytest.mark.ros
 @pytest.mark.parametrize("name", NODES)
-def test_a_node_may_do_exactly_what_it_does(graph, nodes, name):
+def test_a_node_may_do_exactly_what_it_does(graph, clock, nodes, name):
     # Of robot_state_publisher: a recorder takes it where there is one.
     graph.node.create_publisher(TFMessage, "/tf_static", 1)
     require_exactly_what_it_does(graph, name, name)
 
 
 @pytest.mark.ros
-def test_the_bag_player_may_do_exactly_what_playing_takes(graph, nodes):
+def test_the_bag_player_may_do_exactly_what_playing_takes(graph, clock, nodes):
     transforms = graph.node.create_publisher(TFMessage, "/tf_static", 1)
     graph.spin_until(transforms.get_subscription_count, "a recording of /tf_static")
     # Commands are in a bag when some have come; simulated time stands still, so nobody walks.
