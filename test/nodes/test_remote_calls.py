@@ -99,8 +99,10 @@ def start(tmp_path):
 
 def test_a_call_ends_when_its_node_is_killed_also_if_another_is_there_at_once(graph, asking, start):
     first = start()
+    graph.spin_until(lambda: asking.count_publishers("/silent/alive") == 1, "the first node")
     call = Call(graph, asking, "/silent/ask")
     graph.spin_until(lambda: first.said("asked") or call.task.done(), "the question")
+    assert not call.task.done(), call.task.result()
     start()
     graph.spin_until(lambda: asking.count_publishers("/silent/alive") == 2, "the second node")
     first.process.kill()
