@@ -12,6 +12,7 @@ from nodes.silent_node import FOREVER, Silent
 from std_srvs.srv import Trigger
 
 from walk_optimizer.errors import WalkOptimizerError
+from walk_optimizer.nodes.remote_service import LEASE
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError, SuiteNode
 from walk_optimizer.nodes.walk_order import SupersededError
 
@@ -103,6 +104,7 @@ def test_a_call_ends_when_its_node_is_killed_also_if_another_is_there_at_once(gr
     call = Call(graph, asking, "/silent/ask")
     graph.spin_until(lambda: first.said("asked") or call.task.done(), "the question")
     assert not call.task.done(), call.task.result()
+    graph.spin_for(LEASE)  # A node's first assertion of liveliness takes seconds.
     start()
     graph.spin_until(lambda: asking.count_publishers("/silent/alive") == 2, "the second node")
     first.process.kill()
