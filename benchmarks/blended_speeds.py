@@ -5,16 +5,15 @@
 Prints the table of docs/any_speed.md.
 """
 
-import tempfile
 import time
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
+from packaged import packaged_library
 
 from walk_optimizer.errors import GaitNotFoundError
-from walk_optimizer.library import EXACT_SPEED_TOLERANCE, GaitLibrary
-from walk_optimizer.model.parameters import SpringMode, WalkerParameters
+from walk_optimizer.library import EXACT_SPEED_TOLERANCE
+from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.request import gait_table_settings
 
 FAMILIES = ("dynamics", "kinematics", "interval_replay", "landing", "impact")
@@ -26,11 +25,10 @@ def main():
     speeds = gait_table_settings().table_speeds()
     print(f"| springs | blended between | of {PER_GAP} speeds | time [s] | {' | '.join(FAMILIES)} |")
     print("| --- | --- | --- | --- |" + " --- |" * len(FAMILIES))
-    with tempfile.TemporaryDirectory() as empty:
-        library = GaitLibrary(WalkerParameters.from_yaml(), Path(empty))
-        for mode in SpringMode:
-            for low, high in pairwise(speeds):
-                print(row(library, mode, low, high))
+    library = packaged_library()
+    for mode in SpringMode:
+        for low, high in pairwise(speeds):
+            print(row(library, mode, low, high))
 
 
 def row(library, mode, low, high):

@@ -7,19 +7,18 @@ from the spring mode with less freedom in the table that ships. No entry may be 
 """
 
 import argparse
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
+from packaged import packaged_library
 from report import machine, table
 
 from walk_optimizer.contact.schedule import CONTACT_FAMILIES
 from walk_optimizer.gait import Gait
-from walk_optimizer.library import GaitLibrary
-from walk_optimizer.model.parameters import SpringMode, WalkerParameters
+from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.request import KMH_PER_MS
 from walk_optimizer.search import SAME_OPTIMUM, Candidate, Search, distinct
 from walk_optimizer.solve.session import SolveSession
@@ -123,8 +122,7 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--output", type=Path, default=PAGE)
     args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as empty:
-        gaits = GaitLibrary(WalkerParameters.from_yaml(), Path(empty)).gaits()  # the packaged table alone
+    gaits = packaged_library().gaits()
     began = machine()
     with ProcessPoolExecutor(args.processes) as pool:
         entries = list(pool.map(measured, gaits, [seeds_of(gaits, one) for one in gaits]))

@@ -4,19 +4,18 @@ import os
 import tempfile
 import time
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 # The package imports it when a replay first needs it; times are without imports.
 import scipy.integrate  # noqa: F401
 from numpy.typing import NDArray
+from packaged import packaged_library
 from plain_refined import PlainRefined, phases_of
 from plain_transcription import FixedSchedule, PlainSolution, kinematic_points, search, with_free_contacts
 
 from walk_optimizer.certificate import certify
 from walk_optimizer.gait import Certificate, Gait, RefinedGait, Trajectory
-from walk_optimizer.library import GaitLibrary
 from walk_optimizer.mechanics import foot_arm
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.optimizer import optimize
@@ -69,9 +68,7 @@ def walker() -> WalkerParameters:
 
 def library_gait(request: GaitRequest) -> Gait:
     """Return the gait of the packaged table for a request."""
-    with tempfile.TemporaryDirectory() as empty:
-        library = GaitLibrary(walker(), Path(empty).resolve())  # the packaged table alone
-        return library.find(request.speed, request.spring_mode)[0]
+    return packaged_library().find(request.speed, request.spring_mode)[0]
 
 
 class Clock:

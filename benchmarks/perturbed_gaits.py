@@ -8,7 +8,6 @@ and with its own contacts. Where that ends near the table's F, complementarity m
 
 import argparse
 import math
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -16,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from packaged import packaged_library
 from report import machine, table
 
 from walk_optimizer.gait import Gait, Trajectory
-from walk_optimizer.library import GaitLibrary
-from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
+from walk_optimizer.model.parameters import KneeSpring, SpringMode
 from walk_optimizer.request import KMH_PER_MS
 from walk_optimizer.search import SAME_OPTIMUM, Candidate, Search, distinct
 from walk_optimizer.solve.session import SolveSession
@@ -158,8 +157,7 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--output", type=Path, default=PAGE)
     args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as empty:
-        gaits = GaitLibrary(WalkerParameters.from_yaml(), Path(empty)).gaits()  # the packaged table alone
+    gaits = packaged_library().gaits()
     began = machine()
     repeated = [[one] * len(gaits) for one in (args.count, args.seed)]
     with ProcessPoolExecutor(args.processes) as pool:

@@ -6,16 +6,15 @@ Each solve has a limit of iterations and of time, and runs in a process of its o
 """
 
 import argparse
-import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from isolation import run_isolated
+from packaged import packaged_library
 from report import machine, save_section, table
 
 from walk_optimizer.errors import GaitNotFoundError
-from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.reference_solve import FIRST_ORDER, OPTIONS, solve_reference
 from walk_optimizer.request import KMH_PER_MS, GaitRequest, gait_table_settings
@@ -63,12 +62,10 @@ def measured(trial: Trial) -> tuple[str, ...]:
 
 def _ours(request: GaitRequest) -> str:
     """Return F of the packaged table, brought to the trial's number of points."""
-    with tempfile.TemporaryDirectory() as empty:
-        library = GaitLibrary(WalkerParameters.from_yaml(), Path(empty))
-        try:
-            gait = library.find(request.speed, request.spring_mode)[0]
-        except GaitNotFoundError:
-            return "-"
+    try:
+        gait = packaged_library().find(request.speed, request.spring_mode)[0]
+    except GaitNotFoundError:
+        return "-"
     return f"{gait.objective * request.points / gait.request.points:.4g}"
 
 

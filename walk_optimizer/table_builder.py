@@ -82,15 +82,17 @@ def _run(job: _Job) -> Outcome:
 
 def _refine(gait: Gait) -> Outcome:
     """Refine one entry, in a process of the pool."""
-    settings = table_solver_settings()
-    return with_refinement(gait, SolveSession(settings, settings.time_limit, None))
+    return with_refinement(gait, _session())
 
 
 def _continue_refined(job: _RefinedJob) -> Outcome:
     """Continue the refinements of neighbours, in a process of the pool."""
+    return Outcome(with_continuation(job.gait, job.seeds, _session()), job.gait.report)
+
+
+def _session() -> SolveSession:
     settings = table_solver_settings()
-    session = SolveSession(settings, settings.time_limit, None)
-    return Outcome(with_continuation(job.gait, job.seeds, session), job.gait.report)
+    return SolveSession(settings, settings.time_limit, None)
 
 
 def build_table(

@@ -9,6 +9,7 @@ from walk_optimizer.certificate import certify, landing_distance
 from walk_optimizer.errors import GaitFileError
 from walk_optimizer.gait import Certificate, CertificateEntry, Gait
 from walk_optimizer.gait_files import SUFFIX, read_gait_file
+from walk_optimizer.gait_files.access import files_in
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.refined_certificate import certify_refined
 
@@ -76,9 +77,10 @@ def verify_folder(folder: Path, walker: WalkerParameters) -> list[Verification]:
     """Verify every gait file of a folder, in the order of their names.
 
     Raises:
-        GaitFileError: the folder is missing or holds no gait file: nothing verified is no success.
+        GaitFileError: the folder is missing, can't be read, or holds no gait file: nothing verified is no
+            success.
     """
-    paths = sorted(path for path in folder.glob(f"*{SUFFIX}") if not path.name.startswith("."))
+    paths = files_in(folder, SUFFIX)
     if not paths:
         raise GaitFileError(f"{folder}: no gait files")
     return [verify_file(path, walker) for path in paths]

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from nodes.conftest import FAST, SLOW, stock
 from nodes.graph import assert_left_cleanly, exists, workers_of
-from nodes.walking import MODE, NODE, Walker, assert_continuous, stamp_ns
+from nodes.walking import BLENDED, MODE, NODE, Walker, assert_continuous, stamp_ns
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
@@ -32,8 +32,6 @@ pytestmark = pytest.mark.ros
 
 OWN = "own"
 LIMITS = gait_table_settings()
-# Blended, because nobody can solve for steps between gaits that are made up; patient with a busy machine.
-BASIC = {"rate": 100.0, "transitions": "blended", "longest_gap": 10.0}
 many = settings(
     max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], database=None
 )
@@ -45,7 +43,7 @@ impossible_speeds = st.floats(width=64).filter(
 @pytest.fixture(scope="module")
 def process(start_for_module, other_walker, tmp_path_factory):
     start_for_module("gait_library", **stock(tmp_path_factory.mktemp("stock"), other_walker))
-    return start_for_module(NODE, walker_file=other_walker, **BASIC)
+    return start_for_module(NODE, walker_file=other_walker, **BLENDED)
 
 
 @pytest.fixture
@@ -151,7 +149,7 @@ def own(graph, start, stocked):
     """A publisher that a test may kill, with its library, apart from the lasting one."""
     start("gait_library", namespace=OWN, **stocked)
     walker = Walker(graph, OWN)
-    walker.process = start(NODE, namespace=OWN, walker_file=stocked["walker_file"], **BASIC)
+    walker.process = start(NODE, namespace=OWN, walker_file=stocked["walker_file"], **BLENDED)
     walker.walk(FAST)
     return walker
 
@@ -195,7 +193,7 @@ def test_a_restarted_publisher_begins_with_a_stand(graph, own, start, stocked):
     own.process.process.send_signal(signal.SIGKILL)
     own.process.process.wait()
     own.states.clear()
-    start(NODE, namespace=OWN, walker_file=stocked["walker_file"], **BASIC)
+    start(NODE, namespace=OWN, walker_file=stocked["walker_file"], **BLENDED)
     own.wait_for("standing")
     own.walk(SLOW)
     answer = graph.call(StopRecording, own.topic("stop_recording"))

@@ -11,7 +11,7 @@ pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Vector3
 from nodes.conftest import FAST, SLOW, stock
-from nodes.walking import MARGIN, NODE, assert_continuous, standing_walker
+from nodes.walking import BLENDED, MARGIN, NODE, assert_continuous, standing_walker
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -29,15 +29,7 @@ TIMEOUT = 0.5
 @pytest.fixture(scope="module")
 def publisher(start_for_module, other_walker, tmp_path_factory):
     start_for_module("gait_library", **stock(tmp_path_factory.mktemp("stock"), other_walker))
-    # A test machine may stall for long; the phase shall then go on with the clock.
-    return start_for_module(
-        NODE,
-        walker_file=other_walker,
-        longest_gap=10.0,
-        rate=100.0,
-        command_timeout=TIMEOUT,
-        transitions="blended",
-    )
+    return start_for_module(NODE, walker_file=other_walker, command_timeout=TIMEOUT, **BLENDED)
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Vector3
 from nodes.conftest import FAST, SLOW, stock
-from nodes.walking import NODE, standing_walker
+from nodes.walking import BLENDED, NODE, standing_walker
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 from walk_optimizer_interfaces.srv import SetGait
@@ -25,13 +25,7 @@ SILENT = f"coming to a stand: no speed on /{NODE}/cmd_vel for {TIMEOUT:g} s"
 def publisher(start_for_module, other_walker, tmp_path_factory):
     start_for_module("gait_library", **stock(tmp_path_factory.mktemp("stock"), other_walker))
     return start_for_module(
-        NODE,
-        walker_file=other_walker,
-        longest_gap=10.0,
-        rate=100.0,
-        command_timeout=TIMEOUT,
-        transitions="blended",
-        joint_torque_limits=SLOW_ONLY,
+        NODE, walker_file=other_walker, command_timeout=TIMEOUT, joint_torque_limits=SLOW_ONLY, **BLENDED
     )
 
 

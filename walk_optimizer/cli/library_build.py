@@ -83,9 +83,10 @@ def run(args: argparse.Namespace) -> int:
 def former_gaits(folder: Path, walker: "WalkerParameters") -> list["Gait"]:
     """Return the gaits of a folder whose certificates hold."""
     from walk_optimizer.gait_files import SUFFIX
+    from walk_optimizer.gait_files.access import files_in
     from walk_optimizer.verification import verify_file
 
-    verified = (verify_file(path, walker) for path in sorted(folder.glob(f"*{SUFFIX}")))
+    verified = (verify_file(path, walker) for path in files_in(folder, SUFFIX))
     return [one.gait for one in verified if one.passed and one.gait is not None]
 
 
