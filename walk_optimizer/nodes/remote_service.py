@@ -1,10 +1,12 @@
 """A service of another node, and whether that node lives.
 
 ROS takes a killed process for alive until the lease of its discovery is over, 20 s by default. So each
-node of the suite has a topic `~/alive`, with one latched message that tells of its start. The
-liveliness of the topic is asserted by the middleware, not by Python, and lapses `LEASE` after the
-process is gone.
+node of the suite has a topic `~/alive`, with one latched message that tells one process from its
+successor. The liveliness of the topic is asserted by the middleware, not by Python, and lapses `LEASE`
+after the process is gone.
 """
+
+from uuid import uuid4
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.client import Client
@@ -12,7 +14,7 @@ from rclpy.duration import Duration
 from rclpy.event_handler import QoSLivelinessChangedInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
-from std_msgs.msg import Empty
+from std_msgs.msg import String
 
 from walk_optimizer.nodes.diagnostics import Finding, Level
 from walk_optimizer.nodes.qos import SERVICE
@@ -29,7 +31,7 @@ _ALIVE = QoSProfile(
 
 def announce_life(node: Node) -> None:
     """Offer `~/alive`, once the node's services are there."""
-    node.create_publisher(Empty, "~/alive", _ALIVE).publish(Empty())
+    node.create_publisher(String, "~/alive", _ALIVE).publish(String(data=uuid4().hex))
 
 
 class RemoteService:
@@ -50,9 +52,10 @@ class RemoteService:
         """
         self.client: Client = node.create_client(kind, name, qos_profile=SERVICE, callback_group=group)
         self.losses, self._lost = 0, False
+        self._life = ""
         folder = self.name.rpartition("/")[0]
         node.create_subscription(
-            Empty,
+            String,
             f"{folder}/alive",
             self._on_start,
             _ALIVE,
@@ -82,9 +85,14 @@ class RemoteService:
             return Finding(Level.OK, f"the {noun} is there", values)
         return Finding(Level.WARN, f"the {noun} is not there: {without_it}", values)
 
-    def _on_start(self, _message: Empty) -> None:
-        """Note a node that has just started: its first assertion of liveliness takes seconds."""
-        self._lost = False
+    def _on_start(self, message: String) -> None:
+        """Note a node that has just started: its first assertion of liveliness takes seconds.
+
+        Its predecessor is gone, also if that never came to assert its own.
+        """
+        if self._life not in ("", message.data):
+            self.losses += 1
+        self._life, self._lost = message.data, False
 
     def _on_liveliness(self, change: QoSLivelinessChangedInfo) -> None:
         """Note whether anybody lives; a node without the topic is never heard of, and counts as alive."""
