@@ -170,11 +170,8 @@ def _score_plain(clock: Clock, request: GaitRequest, found: PlainSolution) -> Sc
     return score_points(times, request, found.points, found.spring, found.status, found.iterations)
 
 
-def plain_refinement(request: GaitRequest, found: PlainSolution) -> Score:
-    """Refine a plain gait on the phases and the mesh that the package found for its own."""
-    model = library_gait(request).refined
-    if model is None:
-        raise RuntimeError("the table's gait has no refinement to take the mesh from")
+def plain_refinement(request: GaitRequest, found: PlainSolution, model: RefinedGait) -> Score:
+    """Refine a plain gait on the phases and the mesh of a refined gait of the package."""
     clock = Clock()
     problem = PlainRefined(request.spring_mode, walker(), phases_of(model.trajectory))
     start = replace(model, trajectory=_on_mesh(model.trajectory, request, found), spring=found.spring)
@@ -182,10 +179,19 @@ def plain_refinement(request: GaitRequest, found: PlainSolution) -> Score:
     return _score_refined(clock.read(), request, solution.trajectory, solution.spring, solution.status)
 
 
+def refined_library_gait(request: GaitRequest) -> RefinedGait:
+    """Return the accurate solution of the packaged table for a request."""
+    refined = library_gait(request).refined
+    if refined is None:
+        raise RuntimeError("the table's gait is not refined")
+    return refined
+
+
 def _on_mesh(mesh: RefinedTrajectory, request: GaitRequest, found: PlainSolution) -> RefinedTrajectory:
     """Interpolate a solution of the Euler grid on a mesh."""
     grid = np.arange(1, request.points + 1) * request.interval
     nodes = mesh.breaks[:-1, None] + mesh.lengths[:, None] * NODES_WITH_START
+    nodes *= request.step_time / mesh.step_time
     net = found.points[[15, 17, 18, 20]] - np.vstack([found.points[16], 0 * grid, found.points[19], 0 * grid])
     net[:, :2] = net[:, 2:3]  # the impulse of the impact, spread over the first interval
 
@@ -221,18 +227,25 @@ def resolved(request: GaitRequest, neighbour: Gait) -> RefinedGait:
     return gait
 
 
-def plain_resolve(request: GaitRequest, neighbour: Gait) -> Score:
+def plain_resolve(request: GaitRequest, neighbour: RefinedGait) -> Score:
     """Do the same in the plain transcription, on the neighbour's phases and mesh."""
-    if neighbour.refined is None:
-        raise RuntimeError("the neighbour has no refinement")
     clock = Clock()
-    problem = PlainRefined(request.spring_mode, walker(), phases_of(neighbour.refined.trajectory))
-    problem.solve(neighbour.refined, request.step_length, request.step_time)
+    problem = PlainRefined(request.spring_mode, walker(), phases_of(neighbour.trajectory))
+    problem.solve(neighbour, request.step_length, request.step_time)
     first, clock = clock.read(), Clock()
-    solution = problem.solve(neighbour.refined, request.step_length, request.step_time)
+    solution = problem.solve(neighbour, request.step_length, request.step_time)
     again = clock.read()
     score = _score_refined(first, request, solution.trajectory, solution.spring, solution.status)
     return replace(score, again=again[0], iterations=solution.iterations)
+
+
+def plain_without_library(request: GaitRequest, neighbour: RefinedGait) -> Score:
+    """Solve for a new speed as who has no library must: a search, then a refinement on the same mesh."""
+    clock = Clock()
+    _, found = plain_search(request)
+    score = plain_refinement(request, found, neighbour)
+    seconds, processor = clock.read()
+    return replace(score, seconds=seconds, processor=processor)
 
 
 def ours_growth(points: int) -> Score:

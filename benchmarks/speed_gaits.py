@@ -133,7 +133,7 @@ class PlainEntry:
         found = bench(measure.plain_search, request, time_limit=WHOLE_SEARCH, label=name)
         refined = Measured(None, "nothing to refine")
         if found.value is not None:
-            arguments = (request, found.value[1])
+            arguments = (request, found.value[1], measure.refined_library_gait(request))
             refined = bench(measure.plain_refinement, *arguments, time_limit=ONE_SOLVE, label=name)
         return cls(request, found, refined)
 
