@@ -21,7 +21,7 @@ ARGUMENTS = {
     "namespace": ("", "Namespace of the nodes."),
     "params_file": ("", "Your parameters, a YAML file for all nodes; they count before those that ship."),
     "walker_file": ("", "YAML file of the walker, for all nodes; config/walker.yaml is the one that ships."),
-    "use_sim_time": ("", "true: take time from /clock. The parameter files say false."),
+    "use_sim_time": ("", "true: take time from /clock; false unless your parameters say so."),
     "autostart": ("", "false: a manager starts library and publisher. The parameter files say true."),
     "log_level": ("info", "debug, info, warn or error."),
     "visualize": ("false", "Also walker_visualizer."),

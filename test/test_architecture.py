@@ -25,7 +25,16 @@ LAYERS = (
     ("solve",),
     ("gait", "refined_trajectory", "refined_peaks"),
     ("certificate", "replay", "refined_certificate", "shadowing"),
-    ("search", "optimizer", "reference_solve", "refinement", "mesh_adaptation", "resolve", "table_builder"),
+    (
+        "search",
+        "optimizer",
+        "reference_solve",
+        "refinement",
+        "mesh_adaptation",
+        "resolve",
+        "comparison",
+        "table_builder",
+    ),
     ("gait_files", "gait_csv"),
     (
         "interpolation",

@@ -24,6 +24,10 @@ def test_of_a_long_one_both_ends_are_left():
     assert len(text) < 150
 
 
+def test_a_number_that_python_does_not_write_is_told():
+    assert quoted(10**5000) == "a number of too many digits"
+
+
 @pytest.mark.parametrize("refuse", [SpringMode.parse, parse_selection, parse_speed])
 def test_refusals_of_requests_are_short(refuse):
     with pytest.raises(InvalidRequestError) as refusal:
@@ -31,7 +35,9 @@ def test_refusals_of_requests_are_short(refuse):
     assert len(str(refusal.value)) < 300
 
 
-@pytest.mark.parametrize("arguments", [["--points", HUGE], ["--speed", HUGE], ["--spring", HUGE]])
+@pytest.mark.parametrize(
+    "arguments", [["--points", HUGE], ["--points", "9" * 400], ["--speed", HUGE], ["--spring", HUGE]]
+)
 def test_refusals_of_the_command_line_are_short(arguments, capsys):
     code = main(["solve", "--speed", "0.3", *arguments])
     assert code == 2

@@ -37,8 +37,13 @@ class JoinedStep:
 
     @property
     def step_length(self) -> float:
-        """Distance that the step covers in [m]."""
+        """Distance that the step covers along the way, in [m]."""
         return self._profile.step_length
+
+    @property
+    def rise(self) -> float:
+        """How much higher the step ends in [m]."""
+        return self._profile.rise
 
     def sample(self, time: float) -> StepSample:
         """Return the walker at a time in [s] from the start of the step, 0 <= time <= step_time."""

@@ -5,7 +5,11 @@ _LONGEST = 100
 
 def quoted(value: object) -> str:
     """Return a value in quotes, as messages show what they got; of a long one the middle is left out."""
-    return shortened(repr(value))
+    try:
+        return shortened(repr(value))
+    except ValueError:
+        # Python writes no whole number of more than some thousand digits.
+        return "a number of too many digits"
 
 
 def shortened(text: str) -> str:

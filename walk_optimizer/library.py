@@ -163,7 +163,7 @@ class GaitLibrary:
                 written with two decimals, as the report does.
 
         Raises:
-            InvalidRequestError: the speed is not finite, or the mode or selection unknown.
+            InvalidRequestError: the speed is no finite number, or the mode or selection unknown.
             GaitNotFoundError: there is no such gait; the message lists the speeds that there are, and
                 says why there is no blend.
         """
@@ -179,7 +179,7 @@ class GaitLibrary:
 
         Returns:
             Its file; a former one of the same request is replaced. The packaged table's gait is
-            still served when its F is smaller.
+            still served when its F is smaller, or it alone is refined.
 
         Raises:
             GaitFileError: the gait is not certified, for another walker, or a number is not finite;
@@ -234,11 +234,16 @@ def _read_entry(path: Path, source: Source, walker: WalkerParameters) -> Library
 def _best(found: Sequence[LibraryEntry]) -> tuple[LibraryEntry, ...]:
     """Return the gaits to serve, in the order of the table: of files for the same request the least F.
 
-    A tuple that is replaced as a whole: another thread that looks a gait up sees the old or the new ones.
+    One that is not refined hides none that is: controllers are fed refined ones. A tuple that is replaced as
+    a whole: another thread that looks a gait up sees the old or the new ones.
     """
+
+    def rank(entry: LibraryEntry) -> tuple[bool, float]:
+        return entry.gait.refined is None, entry.gait.objective
+
     best: dict[str, LibraryEntry] = {}
     for entry in found:
         other = best.get(entry.path.name)
-        if other is None or entry.gait.objective <= other.gait.objective:
+        if other is None or rank(entry) <= rank(other):
             best[entry.path.name] = entry
     return tuple(sorted(best.values(), key=table_order))

@@ -10,7 +10,13 @@ from walk_optimizer.gait import Gait
 from walk_optimizer.interpolation import interpolated
 from walk_optimizer.library_entries import LibraryEntry, Source
 from walk_optimizer.model.parameters import SpringMode
-from walk_optimizer.request import KMH_PER_MS, TABLE_SPEED_TOLERANCE, GaitRequest, gait_table_settings
+from walk_optimizer.request import (
+    KMH_PER_MS,
+    TABLE_SPEED_TOLERANCE,
+    GaitRequest,
+    gait_table_settings,
+    speed_number,
+)
 
 # Speeds that differ by less are the same to a walker, in [m/s].
 EXACT_SPEED_TOLERANCE = 1e-4
@@ -50,10 +56,11 @@ class Query:
         """Refuse a speed that is none.
 
         Raises:
-            InvalidRequestError: the speed is not finite.
+            InvalidRequestError: the speed is no number, or not finite.
         """
-        if not math.isfinite(self.speed):
-            raise InvalidRequestError(f"speed is {self.speed} m/s, expected a finite number")
+        speed = speed_number(self.speed)
+        if not math.isfinite(speed):
+            raise InvalidRequestError(f"speed is {speed} m/s, expected a finite number")
 
     def fits(self, entry: LibraryEntry) -> bool:
         """Return whether a gait is of the mode and, where one is asked for, of the number of points."""

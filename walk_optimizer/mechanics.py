@@ -140,6 +140,11 @@ def foot_arm(walker: WalkerParameters, q: FloatArray, leg: int) -> Arm:
     return _leg(walker, q, leg)[2]
 
 
+def foot_2_ahead(walker: WalkerParameters, state: FloatArray) -> float:
+    """Return how far foot 2 is ahead of the origin in a state (12,), in [m]: as a step ends, its length."""
+    return float(foot_arm(walker, state[:6, None], 1).position[0, 0])
+
+
 def horizontal_and_vertical(walker: WalkerParameters, components: FloatArray) -> FloatArray:
     """Return x, y of foot 1, then of foot 2, (4, N), of what is given along and normal to the ground."""
     pairs = (walker.terrain.horizontal_and_vertical(components[rows]) for rows in ([0, 1], [2, 3]))

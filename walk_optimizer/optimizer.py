@@ -177,7 +177,8 @@ class _Pipeline:
         self.starts += len(coarse)
         kept = self.settings.kept_starts
         families = self.session.map(with_contacts, [*product(distinct(coarse)[:kept], CONTACT_FAMILIES)])
-        return self.session.map(on_grid, distinct(families)[:kept]) or coarse
+        # Where nothing was solved, what was tried last says why.
+        return self.session.map(on_grid, distinct(families)[:kept]) or families or coarse
 
     def _from_seeds(self, seeds: Sequence[Gait]) -> list[Candidate]:
         """Return the optima that continue the seeds."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.gait import Gait, RefinedGait, Trajectory, read_only
-from walk_optimizer.model.kinematics import HIP_X, RELABELLED
+from walk_optimizer.model.kinematics import HIP_X, HIP_Y, RELABELLED
 from walk_optimizer.refined_trajectory import RefinedTrajectory
 
 FloatArray = NDArray[np.float64]
@@ -42,16 +42,27 @@ class StepProfile(Protocol):
 
     @property
     def step_length(self) -> float:
-        """Distance that the step covers in [m]."""
+        """Distance that the step covers along the way, in [m]."""
+
+    @property
+    def rise(self) -> float:
+        """How much higher the step ends in [m]."""
 
     def sample(self, time: float) -> StepSample:
         """Return the walker at a time in [s] from the start of the step, 0 <= time <= step_time."""
 
 
-def relabelled(q: FloatArray, step_length: float) -> FloatArray:
-    """Return coordinates (6,) as the next step sees them: legs exchanged, origin one step further."""
+def relabelled(q: FloatArray, step_length: float, rise: float) -> FloatArray:
+    """Return coordinates (6,) as the next step sees them: legs exchanged, origin where foot 2 stands.
+
+    Args:
+        q: Coordinates at the end of a step, (6,).
+        step_length: Of the step in [m].
+        rise: How much higher it ends in [m].
+    """
     exchanged = q[list(RELABELLED)]
     exchanged[HIP_X] -= step_length
+    exchanged[HIP_Y] -= rise
     return exchanged
 
 
@@ -62,7 +73,7 @@ def join_error(before: StepProfile, after: StepProfile) -> float:
     """
     end = before.sample(before.step_time).q
     if math.isfinite(before.step_time):
-        end = relabelled(end, before.step_length)
+        end = relabelled(end, before.step_length, before.rise)
     return float(np.max(np.abs(after.sample(0.0).q - end)))
 
 
@@ -76,18 +87,19 @@ class EulerProfile:
 
     method = "implicit_euler"
 
-    def __init__(self, trajectory: Trajectory, step_length: float, step_time: float) -> None:
+    def __init__(self, trajectory: Trajectory, step_length: float, rise: float, step_time: float) -> None:
         """Tabulate the intervals.
 
         Args:
             trajectory: States and torques on an even grid.
             step_length: In [m].
+            rise: How much higher the step ends in [m].
             step_time: In [s].
         """
-        self._step_time, self._step_length = step_time, step_length
+        self._step_time, self._step_length, self._rise = step_time, step_length, rise
         self._count = trajectory.points
         self._interval = step_time / trajectory.points
-        before = relabelled(trajectory.q[:, -1], step_length)
+        before = relabelled(trajectory.q[:, -1], step_length, rise)
         ends = np.column_stack([before, trajectory.q])
         # One row an interval, so that a sample is a few views and one sum.
         self._starts = read_only(ends[:, :-1].T)
@@ -97,7 +109,8 @@ class EulerProfile:
     @classmethod
     def of(cls, gait: Gait) -> "EulerProfile":
         """Return the profile of a gait."""
-        return cls(gait.trajectory, gait.step_length, gait.request.step_time)
+        rise = _rise_of(gait, gait.step_length)
+        return cls(gait.trajectory, gait.step_length, rise, gait.request.step_time)
 
     @property
     def step_time(self) -> float:
@@ -106,8 +119,13 @@ class EulerProfile:
 
     @property
     def step_length(self) -> float:
-        """Distance that the step covers in [m]."""
+        """Distance that the step covers along the way, in [m]."""
         return self._step_length
+
+    @property
+    def rise(self) -> float:
+        """How much higher the step ends in [m]."""
+        return self._rise
 
     def sample(self, time: float) -> StepSample:
         """Return the walker at a time in [s] from the start of the step, 0 <= time <= step_time."""
@@ -127,19 +145,25 @@ class RefinedProfile:
 
     method = "radau"
 
-    def __init__(self, trajectory: RefinedTrajectory, step_length: float) -> None:
+    def __init__(self, trajectory: RefinedTrajectory, step_length: float, rise: float) -> None:
         """Take a trajectory.
 
         Args:
             trajectory: One step on collocation intervals.
             step_length: In [m].
+            rise: How much higher the step ends in [m].
         """
-        self._trajectory, self._step_length = trajectory, step_length
+        self._trajectory, self._step_length, self._rise = trajectory, step_length, rise
 
     @classmethod
-    def of(cls, refined: RefinedGait) -> "RefinedProfile":
-        """Return the profile of the refined part of a gait."""
-        return cls(refined.trajectory, refined.step_length)
+    def of(cls, step: RefinedGait, rise: float = 0.0) -> "RefinedProfile":
+        """Return the profile of a step.
+
+        Args:
+            step: The refined part of a gait, or a step between two paces.
+            rise: How much higher it ends in [m]; steps between paces are on level ground.
+        """
+        return cls(step.trajectory, step.step_length, rise)
 
     @property
     def step_time(self) -> float:
@@ -148,8 +172,13 @@ class RefinedProfile:
 
     @property
     def step_length(self) -> float:
-        """Distance that the step covers in [m]."""
+        """Distance that the step covers along the way, in [m]."""
         return self._step_length
+
+    @property
+    def rise(self) -> float:
+        """How much higher the step ends in [m]."""
+        return self._rise
 
     def sample(self, time: float) -> StepSample:
         """Return the walker at a time in [s] from the start of the step, 0 <= time <= step_time."""
@@ -160,11 +189,12 @@ class RefinedProfile:
 
 def profile_of(gait: Gait) -> StepProfile:
     """Return how a gait is walked: refined where that is certified, else as on the report's grid."""
-    return most_accurate(EulerProfile.of(gait), gait.refined)
-
-
-def most_accurate(euler: EulerProfile, refined: RefinedGait | None) -> StepProfile:
-    """Return the profile of a refined gait where there is a certified one, else that of the report's grid."""
+    refined = gait.refined
     if refined is None or not refined.certificate.certified:
-        return euler
-    return RefinedProfile.of(refined)
+        return EulerProfile.of(gait)
+    return RefinedProfile.of(refined, _rise_of(gait, refined.step_length))
+
+
+def _rise_of(gait: Gait, step_length: float) -> float:
+    """Return how much higher a step of a gait ends in [m], whose treads are as long as was asked for."""
+    return float(gait.walker.terrain.height(step_length, gait.request.step_length))

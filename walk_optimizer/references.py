@@ -70,14 +70,16 @@ class Reference:
         return self.effort[[0, 1, 3]]
 
 
-def make_reference(sample: StepSample, step: int, time: float, origin: float, rate: float = 1.0) -> Reference:
+def make_reference(
+    sample: StepSample, step: int, time: float, origin: FloatArray, rate: float = 1.0
+) -> Reference:
     """Return the reference of a sample.
 
     Args:
         sample: The walker in its step.
         step: Number of the step.
         time: Since the start of the step in [s].
-        origin: Where the step's coordinates begin along the way, in [m].
+        origin: Where the step's coordinates begin (x, y) in [m] since the start of the walk, (2,).
         rate: Time of the walk for each time of the clock, in [0, 1]. Velocities scale with it; so do the
             torques, because those of a walk hold no walker that stands still in the middle of a step.
     """
@@ -85,8 +87,7 @@ def make_reference(sample: StepSample, step: int, time: float, origin: float, ra
     left_is_stance = step % 2 == 0
     rows = _LEFT_IS_STANCE if left_is_stance else _LEFT_IS_SWING
     effort = [u1, u2, -u1, u3] if left_is_stance else [-u1, u3, u1, u2]
-    base = sample.q[_BASE]
-    base[0] += origin
+    base = sample.q[_BASE] + origin
     qdot = sample.qdot * rate
     return Reference(sample.q[rows], qdot[rows], np.array(effort), base, qdot[_BASE], step, time)
 
@@ -112,7 +113,8 @@ def cycle_reference(profile: StepProfile, time: float) -> Reference:
     """Return the reference at a time in [s] of the cycle, 0 <= time <= 2 step_time."""
     step = int(time > profile.step_time)
     local = min(max(time - step * profile.step_time, 0.0), profile.step_time)
-    return make_reference(profile.sample(local), step, local, step * profile.step_length)
+    origin = np.array([step * profile.step_length, step * profile.rise])
+    return make_reference(profile.sample(local), step, local, origin)
 
 
 def require_rate(rate: float, highest: float) -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.gait import Certificate, Gait, RefinedGait
-from walk_optimizer.mechanics import foot_arm, horizontal_and_vertical
+from walk_optimizer.mechanics import foot_2_ahead, horizontal_and_vertical
 from walk_optimizer.mesh_adaptation import MeshErrors, resampled, trajectory_on
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.refined_certificate import certify_refined
@@ -87,8 +87,7 @@ def certified_refinement(
     """Return a solution with its certificate; None where there is none or it fails."""
     if solution.trajectory is None:
         return None
-    end = solution.trajectory.states[-1, -1][:6, None]
-    step_length = float(foot_arm(walker, end, 1).position[0, 0])
+    step_length = foot_2_ahead(walker, solution.trajectory.states[-1, -1])
     bare = RefinedGait(solution.trajectory, solution.spring, step_length, Certificate(()))
     certificate = certify_refined(walker, request, bare)
     return replace(bare, certificate=certificate) if certificate.certified else None

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from walk_optimizer.model.parameters import SpringMode
+from walk_optimizer.request import KMH_PER_MS, TABLE_SPEED_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,14 @@ class ReportRow:
     speed_kmh: float
     results: dict[SpringMode, ReportResult]
 
+    def distance(self, speed: float) -> float:
+        """Return how far a speed in [m/s] is from that of the row, in [m/s]."""
+        return abs(speed - self.speed_kmh / KMH_PER_MS)
+
+    def is_of(self, speed: float) -> bool:
+        """Return whether the row is that of a speed in [m/s], within the decimals that are printed."""
+        return self.distance(speed) <= TABLE_SPEED_TOLERANCE
+
 
 def _row(speed: float, stiffness: tuple[float, float], both: tuple[float, float, float]) -> ReportRow:
     """Return a row from (K, F%) and (K, q_eq, F%)."""
@@ -53,3 +62,8 @@ TABLE_I = (
     _row(3.09, (0.01, 111), (4.19, 3.04, 79)),
     _row(3.92, (0.00, 100), (0.73, 0.00, 9)),
 )
+
+
+def reported(speed: float) -> ReportRow | None:
+    """Return the row of a speed in [m/s]; None where the report has none."""
+    return next((row for row in TABLE_I if row.is_of(speed)), None)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.figures import report_figures as draw
 from walk_optimizer.gait import Gait
 from walk_optimizer.gait_files.access import write_text
@@ -19,7 +20,7 @@ from walk_optimizer.request import KMH_PER_MS, GaitRequest, gait_table_settings
 from walk_optimizer.transcription import layout
 from walk_optimizer.transcription.problems import complementarity_problem
 
-# The speed of figures 4 and 5, by its place in the table: 1.15 km/h.
+# The speed of figures 4 and 5, by its place in the report's table: 1.15 km/h.
 _CLOSE_UP = 1
 _SPARSITY_POINTS = 20
 # A knee bends for a "dent" when it stretches again by this much, in [degrees].
@@ -40,11 +41,12 @@ def reproduce(library: GaitLibrary, folder: Path, table: str) -> Path:
         The page, `reproduction.md`.
 
     Raises:
+        ConfigurationError: the table has not all speeds of the report.
         GaitNotFoundError: an entry of the table is missing.
         MissingDependencyError: matplotlib is not installed.
         GaitFileError: a file can't be written.
     """
-    speeds = gait_table_settings().table_speeds()
+    speeds = report_speeds()
     gaits = {mode: [library.find(speed, mode)[0] for speed in speeds] for mode in SpringMode}
     nominal, close_up = gaits[SpringMode.NONE], {mode: gaits[mode][_CLOSE_UP] for mode in SpringMode}
     draw.draw_sparsity(sparsity(library.walker, _SPARSITY_POINTS), _SPARSITY_POINTS, folder / "figure_1.png")
@@ -57,13 +59,32 @@ def reproduce(library: GaitLibrary, folder: Path, table: str) -> Path:
     return page
 
 
+def report_speeds() -> list[float]:
+    """Return the speeds of the table that are those of the report, in [m/s], slowest first.
+
+    Raises:
+        ConfigurationError: the table lacks one.
+    """
+    speeds = gait_table_settings().table_speeds()
+    nearest = [min(speeds, key=row.distance) for row in TABLE_I]
+    lacking = [
+        f"{row.speed_kmh:.2f}" for row, speed in zip(TABLE_I, nearest, strict=True) if not row.is_of(speed)
+    ]
+    if lacking:
+        raise ConfigurationError(
+            "the report's table and figures need gaits of all its speeds; the table of "
+            f"config/gait_table.yaml, with {len(speeds)} gaits, lacks {', '.join(lacking)} km/h"
+        )
+    return nearest
+
+
 def sparsity(walker: WalkerParameters, points: int) -> NDArray[np.bool_]:
     """Return the pattern of the constraints' Jacobian in the order of the report, (20 N + 1, 23 N + 2).
 
     A complementarity constraint takes part with its product: phi(a, b) depends on the same variables.
     """
-    step = gait_table_settings().table_steps()[_CLOSE_UP]
-    request = GaitRequest.for_step(*step, SpringMode.STIFFNESS_AND_EQUILIBRIUM, points)
+    speed = TABLE_I[_CLOSE_UP].speed_kmh / KMH_PER_MS
+    request = GaitRequest.for_speed(speed, SpringMode.STIFFNESS_AND_EQUILIBRIUM, points)
     jacobian = complementarity_problem(request, walker, 1e-8).nlp.jacobian.sparsity_out(1)
     pattern = np.zeros(jacobian.shape, dtype=bool)
     pattern[tuple(np.array(jacobian.get_triplet()))] = True

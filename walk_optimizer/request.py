@@ -10,7 +10,7 @@ from typing import Any
 
 from walk_optimizer.errors import ConfigurationError, InvalidRequestError, quoted
 from walk_optimizer.model.parameters import SpringMode
-from walk_optimizer.resources import config_file, require_positive, settings_from_yaml
+from walk_optimizer.resources import as_float, config_file, require_positive, settings_from_yaml
 
 KMH_PER_MS = 3.6
 # The report prints km/h with two decimals: a speed within one unit of the last one names a table gait.
@@ -155,8 +155,8 @@ class GaitRequest:
         """
         settings = gait_table_settings()
         for name, value in (("step length", step_length), ("step time", step_time)):
-            if not (_is_number(value) and math.isfinite(value) and value > 0):
-                raise InvalidRequestError(f"{name} is {value!r}, allowed are finite numbers above 0")
+            if not (_is_number(value) and 0 < as_float(value) < math.inf):
+                raise InvalidRequestError(f"{name} is {quoted(value)}, allowed are finite numbers above 0")
         _checked_speed(step_length / step_time, settings)
         return cls(step_length, step_time, SpringMode.parse(spring_mode), _checked_points(points, settings))
 
@@ -166,17 +166,26 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
-def _checked_speed(speed: float, settings: GaitTableSettings) -> float:
-    """Return the speed; raise InvalidRequestError outside the settings' range."""
+def speed_number(speed: Any) -> float:
+    """Return a speed in [m/s] as a float, whatever its value.
+
+    Raises:
+        InvalidRequestError: it is no number.
+    """
     if not _is_number(speed):
-        raise InvalidRequestError(f"speed is {speed!r}, expected a number, in m/s")
-    low, high = settings.minimum_speed, settings.maximum_speed
-    if not (math.isfinite(speed) and low <= speed <= high):
+        raise InvalidRequestError(f"speed is {quoted(speed)}, expected a number, in m/s")
+    return as_float(speed)
+
+
+def _checked_speed(given: float, settings: GaitTableSettings) -> float:
+    """Return the speed; raise InvalidRequestError outside the settings' range."""
+    speed, low, high = speed_number(given), settings.minimum_speed, settings.maximum_speed
+    if not low <= speed <= high:
         raise InvalidRequestError(
             f"speed is {speed:.8g} m/s, allowed is {low:g} to {high:g} m/s "
             f"({low * KMH_PER_MS:.2f} to {high * KMH_PER_MS:.2f} km/h)"
         )
-    return float(speed)
+    return speed
 
 
 def _checked_points(points: int | None, settings: GaitTableSettings) -> int:
@@ -189,8 +198,8 @@ def _checked_points(points: int | None, settings: GaitTableSettings) -> int:
     except TypeError:
         count = low - 1
     if not low <= count <= high:
-        estimate = f" (about {count * _BYTES_PER_POINT / 1e9:.1f} GB)" if count > high else ""
-        raise InvalidRequestError(f"N is {points!r} grid points{estimate}, allowed is {low} to {high}")
+        estimate = f" (about {as_float(count) * _BYTES_PER_POINT / 1e9:.4g} GB)" if count > high else ""
+        raise InvalidRequestError(f"N is {quoted(points)} grid points{estimate}, allowed is {low} to {high}")
     return count
 
 

@@ -10,7 +10,7 @@ from typing import Any, TypeVar, get_type_hints
 
 import yaml
 
-from walk_optimizer.errors import ConfigurationError
+from walk_optimizer.errors import ConfigurationError, quoted
 
 Settings = TypeVar("Settings")
 _PACKAGE = Path(__file__).resolve().parent
@@ -56,6 +56,9 @@ def read_yaml(path: Path) -> dict[str, Any]:
         raise ConfigurationError(f"{path}: not valid YAML: {error}") from error
     except UnicodeDecodeError as error:
         raise ConfigurationError(f"{path}: not valid YAML: no UTF-8 text, {error.reason}") from error
+    except ValueError as error:
+        # A date that there is not, or a whole number of thousands of digits.
+        raise ConfigurationError(f"{path}: not valid YAML: {error}") from error
     if not isinstance(content, dict):
         raise ConfigurationError(f"{path}: expected `name: value` entries")
     return {str(name): value for name, value in content.items()}
@@ -126,11 +129,19 @@ def require_positive(settings: Any, label: str = "") -> None:
         if field.type not in (int, float):
             continue
         number = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
-        if not (number and 0 < value < math.inf):
+        if not (number and 0 < as_float(value) < math.inf):
             expected = "a positive whole number" if whole else "a positive number"
             raise ConfigurationError(
-                f"{label}{field.name} is {value!r}, expected {expected}{text_hint(value)}"
+                f"{label}{field.name} is {quoted(value)}, expected {expected}{text_hint(value)}"
             )
+
+
+def as_float(number: float) -> float:
+    """Return a number as a float; infinite where it is a whole number beyond all floats."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
 
 
 def text_hint(value: Any) -> str:

@@ -14,7 +14,7 @@ class StandProfile:
 
     method = "stand"
     step_time = math.inf
-    step_length = 0.0
+    step_length = rise = 0.0
 
     def __init__(self, standing: Standing) -> None:
         """Hold a pose."""
@@ -30,6 +30,7 @@ class ArrivalProfile:
     """The pose of a stand for a time, in the words of the step that ends in it: foot 2 is ahead."""
 
     method = "stand"
+    rise = 0.0
 
     def __init__(self, standing: Standing, step_time: float) -> None:
         """Hold the pose.
@@ -40,7 +41,7 @@ class ArrivalProfile:
         """
         self.step_time = step_time
         self.step_length = standing.feet_distance
-        q = read_only(relabelled(standing.q, -self.step_length))
+        q = read_only(relabelled(standing.q, -self.step_length, -self.rise))
         u1, u2, u3 = standing.torques
         self._sample = StepSample(q, read_only(np.zeros(6)), read_only(np.array([-u1, u3, u2])))
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from multiprocessing import get_context
 
+from walk_optimizer.comparison import refines_better
 from walk_optimizer.gait import Gait
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize, with_continuation, with_refinement
@@ -110,7 +111,7 @@ def build_table(
         walker: The walker.
         processes: Solves that run at a time.
         points: Grid points of a step; the settings' by default.
-        modes: Spring modes, each after the ones that it must not be worse than.
+        modes: Spring modes.
         known: Gaits of a former table, which the new one is to be no worse than.
         on_progress: Told after each solve; what it raises ends the build, after the solves that run.
 
@@ -156,9 +157,17 @@ class _Builder:
             improved = self._solve([job for job in jobs if job.seeds], "continuation")
             if not improved:
                 break
+        self._recall_refinements()
         self._refine()
         self._continue_refinements()
         return self.table
+
+    def _recall_refinements(self) -> None:
+        """Begin with the refinements of the former table: others have to be better."""
+        for key, gait in self.table.items():
+            former = self.known.get(self.requests[key])
+            if former is not None:
+                self.table[key] = replace(gait, refined=former.refined)
 
     def _continue_refinements(self) -> None:
         """Continue the refinements of all entries until none improves."""
@@ -176,7 +185,7 @@ class _Builder:
         better = set()
         for done, future in enumerate(as_completed(futures), start=1):
             key, outcome = futures[future], future.result()
-            kept = outcome.gait is not None and self._refines_better(key, outcome.gait)
+            kept = outcome.gait is not None and refines_better(outcome.gait.refined, self.table[key].refined)
             if kept and outcome.gait is not None:
                 self.table[key] = outcome.gait
                 better.add(key)
@@ -193,7 +202,7 @@ class _Builder:
         futures = {self.pool.submit(_refine, gait): key for key in self.table for gait in self._good(key)}
         for done, future in enumerate(as_completed(futures), start=1):
             key, outcome = futures[future], future.result()
-            kept = outcome.gait is not None and self._refines_better(key, outcome.gait)
+            kept = outcome.gait is not None and refines_better(outcome.gait.refined, self.table[key].refined)
             if kept and outcome.gait is not None:
                 self.table[key] = replace(self.table[key], refined=outcome.gait.refined)
                 outcome = replace(outcome, gait=self.table[key])
@@ -203,12 +212,6 @@ class _Builder:
         """Return the entry's optima that are not much worse than the best."""
         largest = self.table[key].objective * (1 + _GOOD)
         return [gait for gait in self.found[key] if gait.objective <= largest]
-
-    def _refines_better(self, key: Key, gait: Gait) -> bool:
-        known = self.table[key].refined
-        if gait.refined is None or known is None:
-            return gait.refined is not None
-        return gait.refined.trajectory.torque_effort < known.trajectory.torque_effort
 
     def _tell(self, progress: TableProgress) -> None:
         if self.on_progress is not None:

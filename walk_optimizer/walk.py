@@ -12,6 +12,8 @@ from collections import deque
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
+
 from walk_optimizer.errors import WalkOptimizerError
 from walk_optimizer.phase_clock import PhaseClock
 from walk_optimizer.profile import StepProfile, join_error
@@ -73,7 +75,7 @@ class Walk:
         self._remaining: deque[StepProfile] = deque()
         self._plan: StepPlan | None = None
         self._lock = threading.Lock()
-        self._step, self._time, self._origin = 0, 0.0, 0.0
+        self._step, self._time, self._origin = 0, 0.0, np.zeros(2)
 
     @property
     def pace(self) -> StepProfile:
@@ -145,7 +147,7 @@ class Walk:
         else:
             self._time -= ended.step_time
             self._step += 1
-            self._origin += ended.step_length
+            self._origin += (ended.step_length, ended.rise)
         with self._lock:
             if not self._remaining and self._plan is not None:
                 self._remaining.extend(self._plan.steps)

@@ -5,6 +5,7 @@ half the time of a search for the new speed alone, and its optima are as good or
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from walk_optimizer.gait import Gait
 from walk_optimizer.library import GaitLibrary
@@ -13,7 +14,7 @@ from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.settings import SolverSettings, solver_settings
-from walk_optimizer.solve.status import ProgressCallback, Status
+from walk_optimizer.solve.status import ProgressCallback, SolveReport, Status
 
 # Whoever ended a solve so does not want another.
 _ENDED = (Status.CANCELLED, Status.TIME_LIMIT)
@@ -44,20 +45,34 @@ def optimize_from(
     settings = settings or solver_settings()
     limit = settings.time_limit if time_limit is None else time_limit
     seeds = neighbours(library.gaits(), request)
-    if seeds:
-        outcome = optimize(
-            request,
-            walker,
-            settings=settings,
-            time_limit=limit,
-            progress=progress,
-            seeds=seeds,
-            from_scratch=False,
-        )
-        if outcome.gait is not None or outcome.report.status in _ENDED:
-            return outcome
-        limit = max(limit - outcome.report.solve_time, 1e-3)
-    return optimize(request, walker, settings=settings, time_limit=limit, progress=progress)
+    if not seeds:
+        return optimize(request, walker, settings=settings, time_limit=limit, progress=progress)
+    continued = optimize(
+        request,
+        walker,
+        settings=settings,
+        time_limit=limit,
+        progress=progress,
+        seeds=seeds,
+        from_scratch=False,
+    )
+    if continued.gait is not None or continued.report.status in _ENDED:
+        return continued
+    left = max(limit - continued.report.solve_time, 1e-3)
+    searched = optimize(request, walker, settings=settings, time_limit=left, progress=progress)
+    return _after(continued.report, searched)
+
+
+def _after(former: SolveReport, outcome: Outcome) -> Outcome:
+    """Return an outcome whose report counts what another solve took before it."""
+    report = replace(
+        outcome.report,
+        starts=former.starts + outcome.report.starts,
+        iterations=former.iterations + outcome.report.iterations,
+        solve_time=former.solve_time + outcome.report.solve_time,
+    )
+    gait = None if outcome.gait is None else replace(outcome.gait, report=report)
+    return replace(outcome, gait=gait, report=report)
 
 
 def neighbours(gaits: Sequence[Gait], request: GaitRequest) -> list[Gait]:

@@ -10,6 +10,7 @@ from walk_optimizer.cli.library_build import bar_text, former_gaits, minutes, so
 from walk_optimizer.gait_files import read_gait_file
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize
+from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import SolveReport, Status
 from walk_optimizer.table_builder import TableProgress
@@ -28,6 +29,15 @@ def worse(gait):
     certificate = certify(gait.walker, gait.request, gait.spring, trajectory)
     assert certificate.certified
     return replace(gait, trajectory=trajectory, certificate=certificate)
+
+
+def worse_refinement(gait):
+    """Return a refinement that is certified but takes more torque, by as much as the certificate allows."""
+    trajectory = replace(gait.refined.trajectory, torques=gait.refined.trajectory.torques * (1 + 1e-5))
+    refined = replace(gait.refined, trajectory=trajectory)
+    certificate = certify_refined(gait.walker, gait.request, refined)
+    assert certificate.certified
+    return replace(refined, certificate=certificate)
 
 
 def test_a_build_never_makes_the_table_worse(tmp_path, solved):
@@ -71,12 +81,36 @@ def test_the_bar_estimates_the_time_that_is_left():
     assert (minutes(0.2), minutes(59.6), minutes(3599.9)) == ("0:00 min", "1:00 min", "60:00 min")
 
 
-def test_a_gait_that_was_refined_again_is_stored(tmp_path, solved):
-    again = replace(solved, trajectory=replace(solved.trajectory, u=solved.trajectory.u * (1 + 1e-12)))
-    assert again.refined is not None
+def test_a_gait_without_refinement_gets_one_and_does_not_lose_it(tmp_path, solved):
+    bare = replace(solved, refined=None)
+    assert store_better(bare, tmp_path)
     assert store_better(solved, tmp_path)
-    assert store_better(again, tmp_path)
-    assert not store_better(replace(again, refined=None), tmp_path)
+    assert not store_better(bare, tmp_path)
+    (path,) = tmp_path.iterdir()
+    assert read_gait_file(path).refined is not None
+
+
+def test_a_better_gait_that_is_not_refined_keeps_the_refinement_that_is_there(tmp_path, solved):
+    assert store_better(worse(solved), tmp_path)
+    assert store_better(replace(solved, refined=None), tmp_path)
+    (path,) = tmp_path.iterdir()
+    stored = read_gait_file(path)
+    assert stored.objective == solved.objective
+    assert stored.refined is not None
+
+
+def test_a_worse_refinement_does_not_replace_a_better_one(tmp_path, solved):
+    assert store_better(solved, tmp_path)
+    assert not store_better(replace(solved, refined=worse_refinement(solved)), tmp_path)
+
+
+def test_a_better_refinement_is_written_beside_a_better_gait(tmp_path, solved):
+    assert store_better(replace(solved, refined=worse_refinement(solved)), tmp_path)
+    assert store_better(worse(solved), tmp_path)
+    (path,) = tmp_path.iterdir()
+    stored = read_gait_file(path)
+    assert stored.objective == solved.objective
+    assert stored.refined.trajectory.torque_effort == solved.refined.trajectory.torque_effort
 
 
 def test_a_build_begins_with_the_certified_gaits_of_its_folder_alone(tmp_path, solved):

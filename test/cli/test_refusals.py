@@ -24,7 +24,7 @@ BAD = [
     (["--speed", "0.3", "--spring", "rubber"], "unknown spring mode 'rubber'; allowed are none, stiffness, "),
     (["--speed", "0.3", "--points", "0"], "N is 0 grid points, allowed is 20 to 2000"),
     (["--speed", "0.3", "--points", "-5"], "N is -5 grid points, allowed is 20 to 2000"),
-    (["--speed", "0.3", "--points", "10000000"], "N is 10000000 grid points (about 400.0 GB), allowed is 20"),
+    (["--speed", "0.3", "--points", "10000000"], "N is 10000000 grid points (about 400 GB), allowed is 20"),
     (["--speed", "0.3", "--points", "2.5"], "N is '2.5' grid points, allowed is 20 to 2000"),
     (["--speed", "0.3", "--time-limit", "0"], "time limit is '0', allowed are finite numbers above 0, in s"),
     (["--speed", "0.3", "--time-limit", "soon"], "time limit is 'soon', allowed"),
@@ -72,7 +72,8 @@ def test_bad_input_of_solve_is_refused_in_one_line(no_work, capsys, arguments, m
     [
         (["export"], "say which gait: --speed SPEED [--spring MODE], or --file GAIT"),
         (["export", "--speed", "9"], LIMITS),
-        (["export", "--speed", "0.3", "--format", "xml"], "invalid choice: 'xml'"),
+        (["export", "--speed", "0.3", "--grid", "coarse"], "invalid choice: 'coarse'"),
+        (["export", "--speed", "0.3", "--format", "csv"], "unrecognized arguments: --format csv"),
         (["export", "--file", "/nowhere/gait.npz"], "/nowhere/gait.npz: can't be read: No such file"),
         (["picture", "--speed", "0.3", "--output", "gait.doc"], "a picture's name ends in .png, .pdf, .svg"),
         (["picture", "--speed", "0.3", "--output", "/nowhere/gait.png"], "the folder /nowhere is missing"),
@@ -103,8 +104,9 @@ def test_bad_input_of_solve_is_refused_in_one_line(no_work, capsys, arguments, m
             for verb in ("reproduce", "demo")
         ],
         (["library", "build", "--output", "/nowhere"], "/nowhere: the folder is missing"),
-        (["library", "build", "--jobs", "0"], "jobs is '0', allowed are whole numbers of at least 1"),
-        (["library", "build", "--jobs", "two"], "jobs is 'two', allowed are whole numbers of at least 1"),
+        (["library", "build", "--jobs", "0"], "jobs is '0', allowed are whole numbers from 1 to 256"),
+        (["library", "build", "--jobs", "two"], "jobs is 'two', allowed are whole numbers from 1 to 256"),
+        (["library", "build", "--jobs", f"1{24 * '0'}"], "allowed are whole numbers from 1 to 256"),
         (["library", "build", "--points", "3"], "N is 3 grid points, allowed is 20 to 2000"),
         (["bag", "info", "/nowhere"], "/nowhere"),
         (["fly"], "invalid choice: 'fly'"),
@@ -120,6 +122,27 @@ def test_the_other_verbs_refuse_too(no_work, capsys, arguments, message):
     assert code == 2
     assert message in printed.err
     assert printed.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("action", ["list", "verify", "build"])
+def test_transitions_on_a_slope_are_refused(capsys, tmp_path, action):
+    walker = tmp_path / "uphill.yaml"
+    walker.write_text("terrain: {slope: 0.05}\n")
+    assert main(["transitions", action, "--folder", str(tmp_path), "--walker", str(walker)]) == 2
+    printed = capsys.readouterr()
+    assert "stands and transitions are for level ground, the walker's terrain is not level" in printed.err
+    assert (printed.err.count("\n"), printed.out) == (1, "")
+
+
+@pytest.mark.parametrize("verb", [["solve", "--speed", "0.3"], ["urdf"]])
+@pytest.mark.parametrize("entry", ["hip_mass: 1{}", "terrain: {{slope: 1{}}}"])
+def test_a_walker_of_numbers_beyond_all_floats_is_refused(no_work, tmp_path, capsys, verb, entry):
+    walker = tmp_path / "walker.yaml"
+    walker.write_text(entry.format(309 * "0"))
+    assert main([*verb, "--walker", str(walker)]) == 2
+    printed = capsys.readouterr()
+    assert " is inf, allowed are finite numbers" in printed.err
+    assert (printed.out, printed.err.count("\n")) == ("", 1)
 
 
 def test_the_script_refuses_without_a_traceback_and_at_once(tmp_path):

@@ -5,12 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cli.console import walk_optimizer
-from library.made_up_gait import all_modes, made_up_gait
+from library.made_up_gait import all_modes, made_up_gait, with_refinement
 
+from walk_optimizer import reproduction
+from walk_optimizer.cli import table_text
+from walk_optimizer.errors import ConfigurationError
 from walk_optimizer.figures.report_figures import HIP_ROWS
 from walk_optimizer.gait_files import gait_file_name, write_gait_file
+from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.reproduction import count_dents, rotation, sparsity
+from walk_optimizer.reproduction import count_dents, report_speeds, rotation, sparsity
 from walk_optimizer.request import gait_table_settings
 
 WALKER = WalkerParameters()
@@ -23,7 +27,7 @@ def folder(tmp_path):
     place.mkdir()
     for mode, torque in zip(all_modes(), (1e-3, 8e-4, 5e-4), strict=True):
         for speed in gait_table_settings().table_speeds():
-            gait = made_up_gait(speed=speed, mode=mode, points=200, torque=torque)
+            gait = with_refinement(made_up_gait(speed=speed, mode=mode, points=200, torque=torque))
             write_gait_file(gait, place / gait_file_name(gait))
     return place
 
@@ -50,6 +54,38 @@ def test_a_library_with_a_gap_is_refused(tmp_path, folder):
     assert done.returncode == 2
     assert "no gait of 0.2353 m/s (0.85 km/h) with springs none" in done.stderr
     assert "for another walker: gravity is 9.81, expected 1.62" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("gaits", "common"),
+    [
+        (5, ["0.84", "-", "1.92", "-", "3.92"]),
+        (13, ["0.84", "-", "1.15", "-", "1.50", "-", "1.92", "-", "2.44", "-", "3.09", "-", "3.92"]),
+    ],
+)
+def test_a_table_of_other_speeds_is_shown_beside_the_rows_of_the_report_that_it_shares(
+    monkeypatch, tmp_path, gaits, common
+):
+    settings = replace(gait_table_settings(), gaits=gaits)
+    monkeypatch.setattr(table_text, "gait_table_settings", lambda: settings)
+    library = GaitLibrary(WALKER, tmp_path)
+    rows = [line.split("|") for line in table_text.table_text(library).splitlines()[3:-2]]
+    assert [row[0].split()[2] for row in rows] == common
+    assert [row[3].split()[0] == "-" for row in rows] == [speed == "-" for speed in common]
+    assert [row[5].split() for row in rows][-1] == ["0.73", "0.00", "9"]
+    assert len(table_text.markdown_table(library).splitlines()) == gaits + 2
+
+
+def test_the_figures_take_the_speeds_of_the_report_or_say_which_the_table_lacks(monkeypatch):
+    seven = gait_table_settings()
+    for gaits in (7, 13, 1201):
+        monkeypatch.setattr(
+            reproduction, "gait_table_settings", lambda many=gaits: replace(seven, gaits=many)
+        )
+        assert report_speeds() == pytest.approx(seven.table_speeds(), abs=0.005)
+    monkeypatch.setattr(reproduction, "gait_table_settings", lambda: replace(seven, gaits=5))
+    with pytest.raises(ConfigurationError, match=r"with 5 gaits, lacks 1\.15, 1\.50, 2\.44, 3\.09 km/h"):
+        report_speeds()
 
 
 def test_sparsity_is_that_of_the_report():

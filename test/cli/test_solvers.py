@@ -28,7 +28,17 @@ def no_work(monkeypatch):
     [
         (["--solver", "knitro"], "unknown solver 'knitro'; allowed are ipopt, uno, fatrop, snopt"),
         (["--formulation", "report", "--solver", "uno"], "--formulation report is IPOPT's"),
-        (["--formulation", "report", "--save"], "leave --solver, --save and --export out"),
+        *[
+            (
+                ["--formulation", "report", *option],
+                f"--formulation report can't be combined with {option[0]};",
+            )
+            for option in (["--save"], ["--export", "gait.csv"], ["--from-scratch"], ["--library", "gaits"])
+        ],
+        (
+            ["--from-scratch", "--library", "gaits"],
+            "--from-scratch without --save can't be combined with --library;",
+        ),
     ],
 )
 def test_impossible_choices_are_refused_before_any_work(no_work, capsys, arguments, message):

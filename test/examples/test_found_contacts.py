@@ -8,7 +8,7 @@ import pytest
 from walk_optimizer.cli.main import main
 from walk_optimizer.contact.schedule import FootMode
 from walk_optimizer.errors import InvalidRequestError
-from walk_optimizer.examples.catalogue import NAMES, solve_example
+from walk_optimizer.examples.catalogue import NAMES, TERRAINS, solve_example
 from walk_optimizer.examples.finding import Finding, runs
 from walk_optimizer.examples.relaxation import best_of_ways
 from walk_optimizer.examples.relaxed_solve import RelaxedSolve
@@ -66,6 +66,22 @@ def test_of_all_ways_the_one_of_least_effort_that_is_certified_is_kept():
 
     assert best_of_ways(found).finding.effort == 3.0
     assert len({(way.relaxations[0], way.barrier) for way in tried}) == len(ends)
+
+
+@pytest.mark.parametrize("name", TERRAINS)
+def test_on_every_terrain_it_is_the_walker_of_the_parameter_file(name, tmp_path, monkeypatch):
+    edited = tmp_path / "walker.yaml"
+    edited.write_text("hip_mass: 30.0\n")
+    monkeypatch.setattr("walk_optimizer.model.parameters.config_file", lambda _: edited)
+    walkers = []
+
+    def find(walker, *_):
+        walkers.append(walker)
+        return SimpleNamespace(finding=None)
+
+    monkeypatch.setattr("walk_optimizer.examples.catalogue.find_contacts", find)
+    solve_example(name)
+    assert walkers == [WalkerParameters(hip_mass=30.0, terrain=TERRAINS[name])]
 
 
 def test_an_example_that_does_not_exist_is_refused_with_those_that_do():

@@ -106,14 +106,19 @@ def _torques(phase: FloatArray) -> FloatArray:
 def _motion(
     request: GaitRequest, walker: WalkerParameters, phase: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return q and p of a stiff stance leg that turns over its foot, and of a swing leg that bends."""
+    """Return q and p of a stiff stance leg that turns over its foot, and of a swing leg that bends.
+
+    On slopes and stairs all that is turned, so that foot 2 lands on the ground.
+    """
     length = walker.leg_length
-    reach = np.arcsin(request.step_length / 2 / length)
+    rise = float(walker.terrain.height(request.step_length, request.step_length))
+    reach = np.arcsin(np.hypot(request.step_length, rise) / 2 / length)
+    tilt = np.arctan2(rise, request.step_length)
     stance = reach * (1 - 2 * phase)
     bend = 0.6 * np.sin(np.pi * phase) ** 2
     swing = reach * (2 * phase - 1) + bend / 2
     straight = np.full(phase.size, np.pi)
-    hip = [-length * np.sin(stance), length * np.cos(stance)]
-    q = np.array([*hip, stance, straight, swing, np.pi - bend])
+    hip = [-length * np.sin(tilt + stance), length * np.cos(tilt + stance)]
+    q = np.array([*hip, tilt + stance, straight, tilt + swing, np.pi - bend])
     wave = np.sin(2 * np.pi * phase)
     return q, np.vstack([np.full(phase.size, 75.0 * request.speed), *[0.1 * wave] * 5])

@@ -12,7 +12,7 @@ from walk_optimizer.library import EXACT_SPEED_TOLERANCE, GaitLibrary, Source
 from walk_optimizer.mechanics import mechanics_at
 from walk_optimizer.model.functions import evaluate
 from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.profile import most_accurate
+from walk_optimizer.profile import profile_of
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.request import GaitRequest, gait_table_settings
 from walk_optimizer.transcription.tableau import DIFFERENTIATION
@@ -41,7 +41,7 @@ def blend(shipped):
 
 
 def profile(gait):
-    return most_accurate(None, gait.refined)
+    return profile_of(gait)
 
 
 def test_a_blend_walks_at_the_speed_that_was_asked_for_and_keeps_the_bounds(blend):

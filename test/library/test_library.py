@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from library.made_up_gait import all_modes, made_up_gait
+from library.made_up_gait import all_modes, made_up_gait, with_refinement
 
 from walk_optimizer import library as library_module
 from walk_optimizer.errors import GaitFileError, GaitNotFoundError, GaitNotWritableError, InvalidRequestError
@@ -82,6 +82,10 @@ def test_nearest_takes_the_closest_speed_of_the_mode(table, folder):
     [
         (math.nan, "none", "exact", "speed is nan m/s, expected a finite number"),
         (math.inf, "none", "nearest", "speed is inf m/s"),
+        pytest.param(10**400, "none", "exact", "speed is inf m/s", id="huge"),
+        ("0.4", "none", "exact", "speed is '0.4', expected a number, in m/s"),
+        (None, "none", "nearest", "speed is None, expected a number"),
+        (True, "none", "nearest", "speed is True, expected a number"),
         (0.3, "rubber", "exact", "unknown spring mode 'rubber'; allowed are none, stiffness"),
         (0.3, "none", "best", "unknown selection 'best'; allowed are exact, interpolated, nearest"),
     ],
@@ -126,6 +130,16 @@ def test_of_the_same_request_the_smaller_objective_is_served(table, folder):
     for each in (library, GaitLibrary(WALKER, folder)):
         assert each.find(FAST, "none")[1] is Source.CACHE
         assert len(each.gaits()) == 1
+
+
+def test_a_gait_that_is_not_refined_hides_none_that_is(table, folder):
+    refined = with_refinement(made_up_gait(torque=2.0))
+    write_gait_file(refined, table / gait_file_name(refined))
+    library = GaitLibrary(WALKER, folder)
+    library.store(made_up_gait(torque=1.0))
+    assert library.find(FAST, "none")[1] is Source.TABLE
+    library.store(with_refinement(made_up_gait(torque=1.0)))
+    assert library.find(FAST, "none")[1] is Source.CACHE
 
 
 def test_summaries_relate_the_modes_of_a_speed(table, folder):

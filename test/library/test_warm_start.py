@@ -70,7 +70,7 @@ def test_neighbours_that_lead_to_nothing_are_followed_by_a_search_unless_it_was_
 
     def failing(request, walker, *, time_limit, seeds=(), from_scratch=True, **_others):
         asked.append((len(seeds), from_scratch, time_limit))
-        return Outcome(None, SolveReport(status, status.sentence, "ipopt"))
+        return Outcome(None, SolveReport(status, status.sentence, "ipopt", "", 2, 30, 1.5))
 
     monkeypatch.setattr("walk_optimizer.warm_start.optimize", failing)
     outcome = optimize_from(library, GaitRequest.for_speed(BETWEEN, "none"), WALKER, time_limit=5.0)
@@ -78,6 +78,8 @@ def test_neighbours_that_lead_to_nothing_are_followed_by_a_search_unless_it_was_
     ended = status in (Status.CANCELLED, Status.TIME_LIMIT)
     assert [(seeds, scratch) for seeds, scratch, _ in asked] == [(2, False), *([] if ended else [(0, True)])]
     assert all(0 < limit <= 5.0 for *_, limit in asked)
+    report, solves = outcome.report, len(asked)
+    assert (report.starts, report.iterations, report.solve_time) == (2 * solves, 30 * solves, 1.5 * solves)
 
 
 def test_a_time_limit_of_nothing_is_refused(library):

@@ -15,25 +15,28 @@ from walk_optimizer.model.parameters import (
 )
 from walk_optimizer.model.symbolic import SymbolicWalker
 from walk_optimizer.model.terrain import Terrain
+from walk_optimizer.resources import as_float
 
 FIELDS = [field.name for field in fields(WalkerParameters) if field.name != "terrain"]
 ABOVE_ZERO = [name for name in FIELDS if name not in MARGINS]
+# Beyond all floats, and beyond what Python writes.
+HUGE = pytest.param(10**5000, id="huge")
 
 
 @pytest.mark.parametrize("name", ABOVE_ZERO)
-@pytest.mark.parametrize("value", [0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("value", [0, -1.0, math.nan, math.inf, HUGE])
 def test_impossible_numbers_are_refused_by_name(name, value):
     with pytest.raises(ConfigurationError) as refusal:
         WalkerParameters(**{name: value})
-    assert f"{name} is {value}, allowed are finite numbers above 0" in str(refusal.value)
+    assert f"{name} is {as_float(value)}, allowed are finite numbers above 0" in str(refusal.value)
 
 
 @pytest.mark.parametrize("name", MARGINS)
-@pytest.mark.parametrize("value", [-0.1, math.nan, math.inf])
+@pytest.mark.parametrize("value", [-0.1, math.nan, math.inf, HUGE])
 def test_a_margin_is_0_or_above(name, value):
     with pytest.raises(ConfigurationError) as refusal:
         WalkerParameters(**{name: value})
-    assert f"{name} is {value}, allowed are 0 and finite numbers above" in str(refusal.value)
+    assert f"{name} is {as_float(value)}, allowed are 0 and finite numbers above" in str(refusal.value)
     assert getattr(WalkerParameters(**{name: 0}), name) == 0
 
 
@@ -126,6 +129,11 @@ def test_entries_that_a_file_leaves_out_are_those_of_the_report(tmp_path):
         ("hip_mass:\n", "walker parameter hip_mass is None, expected a number"),
         ("gravity: -9.81\n", "walker parameter gravity is -9.81, allowed are finite numbers above 0"),
         ("gravity: .nan\n", "walker parameter gravity is nan, allowed are finite numbers above 0"),
+        pytest.param(
+            f"gravity: 1{309 * '0'}\n", "gravity is inf, allowed are finite numbers", id="beyond floats"
+        ),
+        pytest.param(f"gravity: 1{5000 * '0'}\n", "not valid YAML", id="beyond what Python reads"),
+        ("hip_mass: 2026-13-01\n", "not valid YAML"),
         ("", "expected `name: value` entries"),
         ("- 45.0\n", "expected `name: value` entries"),
         ("hip_mass: [\n", "not valid YAML"),

@@ -75,6 +75,7 @@ def test_stairs_need_the_length_of_a_step():
     [
         ({"slope": 1.0}, "terrain slope is 1.0 rad, allowed is -pi/4 to pi/4"),
         ({"slope": math.nan}, "terrain slope is nan, allowed are finite numbers"),
+        ({"slope": -(10**400)}, "terrain slope is -inf, allowed are finite numbers"),
         ({"step_up": "3 cm"}, "terrain step_up is '3 cm', expected a number"),
         ({"step_up": True}, "terrain step_up is True, expected a number"),
         ({"step_up": 1.0}, "terrain step_up is 1.0 m, allowed is less than the leg's 1.0 m"),

@@ -161,6 +161,17 @@ def test_a_configuration_that_fails_says_why(graph, start, tmp_path):
     assert_left_cleanly(node, node.stop())
 
 
+def test_a_walker_on_a_slope_is_refused_with_what_is_possible(graph, start, tmp_path):
+    walker_file = tmp_path / "walker.yaml"
+    walker_file.write_text("terrain: {slope: 0.05}\n")
+    node = start(NODE, autostart=False, walker_file=walker_file)
+    assert not change(graph, Transition.TRANSITION_CONFIGURE)
+    assert state(graph) == "unconfigured"
+    refusal = "can't configure: the walker's terrain is a slope or stairs; gaits there are solved, exported"
+    graph.spin_until(lambda: refusal in node.output(), "the reason")
+    assert_left_cleanly(node, node.stop())
+
+
 def test_two_walkers_in_one_graph_walk_each_for_itself(graph, start, stocked):
     names = ("one", "two")
     for name in names:

@@ -11,6 +11,7 @@ pytest.importorskip("rclpy")
 
 from library.made_up_gait import made_up_gait
 
+from walk_optimizer.errors import GaitFileError
 from walk_optimizer.library_entries import LibraryEntry, Source, summarize
 from walk_optimizer.nodes.conversions import (
     REFUSED,
@@ -26,6 +27,20 @@ def test_a_report_survives_the_message():
     violations = (FamilyViolation("dynamics", 2.5, "N"), FamilyViolation("speed", 0.1, "m/s"))
     report = SolveReport(Status.INFEASIBLE, "no", "ipopt", "kinematic", 3, 41, 1.25, 7.5, violations)
     assert report_from_message(report_to_message(report)) == report
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "fault"),
+    [
+        ("status", "optimal", "no status 'optimal'; there are solved, "),
+        ("unit", ["N", "N"], "columns of its violations are not equally long"),
+    ],
+)
+def test_a_report_that_makes_no_sense_is_refused(name, value, fault):
+    message = report_to_message(SolveReport(Status.INFEASIBLE, "no", "ipopt"))
+    setattr(message, name, value)
+    with pytest.raises(GaitFileError, match=fault):
+        report_from_message(message)
 
 
 def test_the_message_documents_every_word_for_how_a_solve_ended():

@@ -11,6 +11,7 @@ from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.optimizer import optimize
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.search import Search
 from walk_optimizer.solve import session as session_module
 from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.solution import Solution
@@ -60,6 +61,20 @@ def test_the_iteration_limit(walker):
     assert outcome.report.iterations == 4 * outcome.report.starts
     assert "no start came near a gait that meets all constraints" in outcome.report.message
     assert_names_worst_family(outcome.report)
+
+
+def test_contact_families_that_all_fail_on_the_coarse_grid(walker, monkeypatch):
+    solved = Search.with_family
+
+    def failing(search, candidate, contacts, points, stage, options=None):
+        if options is not None:  # A kinematic start.
+            return solved(search, candidate, contacts, points, stage, options)
+        return replace(candidate, contacts=contacts, status=Status.ITERATION_LIMIT)
+
+    monkeypatch.setattr(Search, "with_family", failing)
+    outcome = optimize(REQUEST, walker, settings=replace(solver_settings(), coarse_points=15))
+    assert outcome.gait is None
+    assert outcome.report.status is Status.ITERATION_LIMIT
 
 
 def test_the_time_limit(walker):

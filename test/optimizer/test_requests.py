@@ -10,12 +10,14 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from walk_optimizer.errors import ConfigurationError, InvalidRequestError
+from walk_optimizer.errors import ConfigurationError, InvalidRequestError, quoted
 from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.request import GaitRequest, GaitTableSettings, gait_table_settings, parse_speed
 from walk_optimizer.resources import settings_from_yaml
 
 SETTINGS = gait_table_settings()
+# Beyond all floats; the larger one is beyond what Python writes.
+HUGE = pytest.mark.parametrize("value", [10**400, 10**5000], ids=["huge", "unwritten"])
 
 
 def refusal(make, *arguments, **keywords):
@@ -26,7 +28,16 @@ def refusal(make, *arguments, **keywords):
 
 @pytest.mark.parametrize(
     ("speed", "got"),
-    [(math.nan, "nan"), (math.inf, "inf"), (-math.inf, "-inf"), (-0.3, "-0.3"), (0.0, "0"), (1.3, "1.3")],
+    [
+        (math.nan, "nan"),
+        (math.inf, "inf"),
+        (-math.inf, "-inf"),
+        pytest.param(10**400, "inf", id="huge"),
+        pytest.param(-(10**5000), "-inf", id="negative"),
+        (-0.3, "-0.3"),
+        (0.0, "0"),
+        (1.3, "1.3"),
+    ],
 )
 def test_impossible_speeds(speed, got):
     allowed = "allowed is 0.15 to 1.2 m/s (0.54 to 4.32 km/h)"
@@ -46,8 +57,15 @@ def test_a_huge_number_of_points_is_refused_before_memory_is_taken():
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert message == "N is 10000000 grid points (about 400.0 GB), allowed is 20 to 2000"
+    assert message == "N is 10000000 grid points (about 400 GB), allowed is 20 to 2000"
     assert peak < 1e6
+
+
+@HUGE
+def test_a_number_of_points_beyond_all_floats_is_refused_in_a_line(value):
+    message = refusal(GaitRequest.for_speed, 0.4, "none", value)
+    assert "grid points (about inf GB), allowed is 20 to 2000" in message
+    assert len(message) < 250
 
 
 def test_whole_numbers_of_numpy_are_as_good():
@@ -73,6 +91,15 @@ def test_impossible_steps(value):
     allowed = "allowed are finite numbers above 0"
     assert refusal(GaitRequest.for_step, value, 0.7) == f"step length is {value!r}, {allowed}"
     assert refusal(GaitRequest.for_step, 0.3, value) == f"step time is {value!r}, {allowed}"
+
+
+@HUGE
+def test_a_step_beyond_all_floats_is_refused_in_a_line(value):
+    for name, step in (("step length", (value, 1.0)), ("step time", (1.0, value))):
+        message = refusal(GaitRequest.for_step, *step)
+        assert message.startswith(f"{name} is ")
+        assert message.endswith(", allowed are finite numbers above 0")
+        assert len(message) < 250
 
 
 def test_a_step_of_impossible_speed():
@@ -145,6 +172,7 @@ def test_texts_that_are_numbers_but_no_possible_speed(text):
         ({"points": 0}, "points is 0, expected a positive whole number"),
         ({"maximum_speed": math.inf}, "maximum_speed is inf, expected a positive number"),
         ({"maximum_speed": "fast"}, "maximum_speed is 'fast', expected a positive number"),
+        ({"gaits": 10**320}, f"gaits is {quoted(10**320)}, expected a positive whole number"),
     ],
 )
 def test_wrong_tables_are_refused_with_the_name_of_the_file(tmp_path, changes, expected):

@@ -13,6 +13,8 @@ from walk_optimizer.optimizer import Outcome
 from walk_optimizer.request import gait_table_settings
 from walk_optimizer.solve.status import SolveReport, Status
 
+KEY = (0, SpringMode.NONE)
+
 
 @pytest.fixture
 def pool(monkeypatch):
@@ -45,6 +47,15 @@ def test_an_interrupted_build_drops_its_queue(pool):
     with pytest.raises(KeyboardInterrupt):
         table_builder.build_table(WalkerParameters(), on_progress=interrupt)
     assert pool.shutdowns == [{"cancel_futures": True}]
+
+
+def test_a_build_begins_with_the_refinements_of_the_former_table():
+    walker = WalkerParameters.from_yaml()
+    former = GaitLibrary(walker).find(0.32, "none", "nearest")[0]
+    builder = table_builder._Builder(walker, {KEY: former.request}, [former], None, None)
+    builder.table = {KEY: replace(former, refined=None)}
+    builder._recall_refinements()
+    assert builder.table[KEY].refined is former.refined
 
 
 def test_refinements_are_continued_until_none_improves(monkeypatch):

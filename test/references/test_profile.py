@@ -7,7 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from library.made_up_gait import made_up_gait, with_refinement
 
-from walk_optimizer.profile import EulerProfile, RefinedProfile, profile_of, relabelled
+from walk_optimizer.mechanics import foot_arm
+from walk_optimizer.model.kinematics import HIP_Y
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.model.terrain import Terrain
+from walk_optimizer.profile import EulerProfile, RefinedProfile, join_error, profile_of, relabelled
 from walk_optimizer.transcription.tableau import NODES
 
 GAIT = made_up_gait(points=20)
@@ -28,7 +32,7 @@ def test_the_step_begins_where_the_one_before_ended():
     hip_x, hip_y, upper_1, knee_1, upper_2, knee_2 = last
     expected = [hip_x - GAIT.step_length, hip_y, upper_2, knee_2, upper_1, knee_1]
     np.testing.assert_array_equal(PROFILE.sample(0.0).q, expected)
-    np.testing.assert_array_equal(relabelled(relabelled(last, 0.3), -0.3)[1:], last[1:])
+    np.testing.assert_allclose(relabelled(relabelled(last, 0.3, 0.1), -0.3, -0.1), last, atol=1e-15)
 
 
 def test_velocity_and_torque_hold_over_the_interval_that_ends_at_the_point():
@@ -89,8 +93,8 @@ def test_the_refined_solution_is_walked_where_it_is_certified():
         "implicit_euler",
         "radau",
     ]
-    longer = RefinedProfile(TRAJECTORY, 0.3)
-    assert (longer.step_length, longer.step_time) == (0.3, STEP)
+    longer = RefinedProfile(TRAJECTORY, 0.3, 0.1)
+    assert (longer.step_length, longer.rise, longer.step_time) == (0.3, 0.1, STEP)
 
 
 def test_refined_samples_at_the_nodes_are_the_solution():
@@ -117,7 +121,7 @@ def test_refined_position_is_continuous_and_velocity_but_for_the_impact():
         np.testing.assert_allclose(before.q, after.q, atol=1e-10)
         # The made-up motion is smooth; its cubic interpolant is not quite.
         np.testing.assert_allclose(before.qdot, after.qdot, atol=5e-3)
-    begin = relabelled(REFINED.sample(STEP).q, REFINED.step_length)
+    begin = relabelled(REFINED.sample(STEP).q, REFINED.step_length, 0.0)
     np.testing.assert_allclose(REFINED.sample(0.0).q, begin, atol=1e-12)
 
 
@@ -126,3 +130,38 @@ def test_a_refined_sample_is_cheap_and_read_only():
     assert min(timeit.repeat(lambda: REFINED.sample(0.3), number=100, repeat=5)) / 100 < 5e-4
     sample = REFINED.sample(0.1)
     assert not any(array.flags.writeable for array in (sample.q, sample.qdot, sample.u))
+
+
+# ---------------------------------------------------------------- slopes and stairs
+
+TERRAINS = [Terrain(slope=0.0873), Terrain(slope=-0.05), Terrain(step_up=0.04), Terrain(0.05, 0.02)]
+
+
+@pytest.fixture(params=TERRAINS, ids=str)
+def elsewhere(request):
+    """A gait on a slope or stairs, on the report's grid and refined, with its profiles."""
+    gait = with_refinement(made_up_gait(walker=WalkerParameters(terrain=request.param)), intervals=20)
+    return gait, (EulerProfile.of(gait), profile_of(gait))
+
+
+def test_a_step_rises_to_where_its_foot_lands_and_the_next_one_begins_there(elsewhere):
+    gait, profiles = elsewhere
+    assert [profile.method for profile in profiles] == ["implicit_euler", "radau"]
+    for profile in profiles:
+        end = profile.sample(STEP).q
+        landing = foot_arm(gait.walker, end[:, None], 1).position[:, 0]
+        assert landing == pytest.approx([profile.step_length, profile.rise])
+        assert abs(profile.rise) > 0.009
+        np.testing.assert_allclose(
+            relabelled(end, profile.step_length, profile.rise), profile.sample(0.0).q, atol=1e-12
+        )
+        assert join_error(profile, profile) < 1e-12
+
+
+def test_the_hip_does_not_leap_in_the_first_interval_of_a_step_that_rises(elsewhere):
+    _, (euler, refined) = elsewhere
+    interval = STEP / GAIT.trajectory.points
+    for number in range(3):
+        moved = refined.sample((number + 1) * interval).q - refined.sample(number * interval).q
+        speed = euler.sample((number + 0.5) * interval).qdot[HIP_Y]
+        assert speed == pytest.approx(moved[HIP_Y] / interval, abs=1e-3)

@@ -5,8 +5,10 @@ from hypothesis import strategies as st
 from library.made_up_gait import made_up_gait
 
 from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.mechanics import foot_arm
 from walk_optimizer.model.functions import evaluate
 from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.profile import EulerProfile
 from walk_optimizer.reference_check import CycleMatcher
 from walk_optimizer.references import EXCHANGED_JOINTS, JOINTS, cycle_reference, sample_cycle
@@ -53,6 +55,22 @@ def test_hip_and_knee_conventions_are_those_of_the_kinematics():
     q = SLOW.sample(0.2).q[:, None]
     feet = evaluate("feet", walker, q, np.zeros_like(q))[0]  # One column a foot.
     np.testing.assert_allclose(foot, feet[:, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("terrain", [Terrain(slope=0.0873), Terrain(step_up=-0.04)], ids=str)
+def test_on_slopes_and_stairs_the_base_is_that_since_the_start_of_the_walk(terrain):
+    walker = WalkerParameters(terrain=terrain)
+    profile = EulerProfile.of(made_up_gait(walker=walker))
+    for time in np.linspace(0.0, 2 * profile.step_time, 30).tolist():
+        reference = cycle_reference(profile, time)
+        q = np.concatenate([reference.base, reference.position])[:, None]
+        standing = foot_arm(walker, q, reference.step).position[:, 0]
+        step = reference.step * np.array([profile.step_length, profile.rise])
+        # On the grid's chords a foot that stands is a little above the ground.
+        np.testing.assert_allclose(standing, step, atol=1e-3)
+    before, after = (cycle_reference(profile, profile.step_time + shift) for shift in (0.0, 1e-9))
+    assert (before.step, after.step) == (0, 1)
+    np.testing.assert_allclose(after.base, before.base, atol=1e-8)
 
 
 def test_references_cannot_be_written_to():

@@ -19,7 +19,10 @@ from walk_optimizer.joint_limits import (
     peaks_of,
     peaks_of_gait,
 )
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.phase_clock import PhaseClock
+from walk_optimizer.profile import profile_of
 from walk_optimizer.references import cycle_reference
 from walk_optimizer.walk import DiscontinuousPlanError, StepPlan, Walk
 
@@ -150,6 +153,24 @@ def test_once_it_is_reached_a_gait_is_streamed_as_it_is():
         expected = cycle_reference(FAST, reference.time + (reference.step % 2) * FAST.step_time)
         np.testing.assert_allclose(reference.position, expected.position, atol=1e-9)
         np.testing.assert_allclose(reference.velocity, expected.velocity, atol=1e-9)
+
+
+def test_up_a_slope_and_stairs_every_step_goes_on_where_the_one_before_ended():
+    walker = WalkerParameters(terrain=Terrain(slope=0.05, step_up=0.03))
+    slow, fast = (
+        profile_of(with_refinement(made_up_gait(speed=speed, walker=walker), intervals=20))
+        for speed in (0.25 / 0.785, 0.8)
+    )
+    walk = Walk(slow, PhaseClock())
+    walk.advance(0.0)
+    walk.follow(blended(slow, fast))
+    duration = 1.5 * slow.step_time + 4 * fast.step_time
+    base = np.array([reference.base for reference in run(walk, 0.0, duration)])
+    assert walk.pace is fast
+    assert np.abs(np.diff(base, axis=0)).max() < 2e-3
+    period = round(fast.step_time / 1e-3)
+    climbed = (base[-1] - base[-1 - period]) / (period * 1e-3)
+    assert climbed == pytest.approx(np.array([fast.step_length, fast.rise]) / fast.step_time, rel=0.01)
 
 
 def test_of_several_plans_the_last_one_counts_and_one_from_elsewhere_is_refused():

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from library.made_up_gait import made_up_gait, with_refinement
 
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.mechanics import foot_arm
 from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.references import cycle_reference
 from walk_optimizer.scene.gait import ShownGait
 from walk_optimizer.scene.paths import Trail, paths_ahead
@@ -30,7 +32,7 @@ def walk(profile, rate, duration, begin=0.0):
     for time in begin + np.arange(0.0, duration, 1 / rate):
         cycles, rest = divmod(time, 2 * profile.step_time)
         reference = cycle_reference(profile, rest)
-        yield reference, reference.base + np.array([2 * cycles * profile.step_length, 0.0])
+        yield reference, reference.base + 2 * cycles * np.array([profile.step_length, profile.rise])
 
 
 @pytest.mark.parametrize("rate", [100.0, 30.0, 3.1])
@@ -61,6 +63,19 @@ def test_the_standing_foot_stands_and_a_foot_lands_a_step_ahead(solved):
     places = np.array(list(stood.values()))
     assert places[:, 0] == pytest.approx(shown.profile.step_length * np.arange(len(places)), abs=1e-3)
     assert places[:, 1] == pytest.approx(0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("terrain", [Terrain(slope=0.0873), Terrain(step_up=-0.04)], ids=str)
+def test_up_a_slope_and_down_stairs_the_base_is_the_walks(terrain):
+    walker = WalkerParameters(terrain=terrain)
+    shown = ShownGait(with_refinement(made_up_gait(walker=walker), intervals=20))
+    tracker = WalkTracker(walker)
+    tracker.follow(shown)
+    offsets = [
+        tracker.take(reference.position).base - base
+        for reference, base in walk(shown.profile, 30.0, 6 * shown.profile.step_time, begin=0.123)
+    ]
+    assert np.ptp(offsets, axis=0).max() < 1e-3
 
 
 def test_without_a_gait_the_lowest_foot_carries_the_walker(solved):
@@ -94,6 +109,17 @@ def test_ground_reaction_is_the_gaits(solved):
         for index in (1, 50, 199):
             time = gait.trajectory.time[index] - 1e-6
             assert shown.reaction(time).ravel() == pytest.approx(gait.trajectory.net_reaction()[:, index])
+
+
+def test_ground_reaction_on_a_slope_is_told_along_the_way_and_up():
+    slope = 0.2
+    gait = made_up_gait(walker=WalkerParameters(terrain=Terrain(slope=slope)))
+    index = 5
+    along, normal = gait.trajectory.net_reaction()[:2, index]
+    cosine, sine = np.cos(slope), np.sin(slope)
+    found = ShownGait(gait).reaction(gait.trajectory.time[index] - 1e-6)
+    assert found[0] == pytest.approx([cosine * along - sine * normal, sine * along + cosine * normal])
+    assert not found[1].any()
 
 
 def test_paths_ahead_begin_at_the_feet_and_end_where_they_land(solved):

@@ -30,8 +30,10 @@ def test_a_fall_is_told_with_its_step_and_reason(tmp_path):
     ("option", "value", "named"),
     [
         ("--steps", "0", "steps is '0', allowed are whole numbers from 1 to 1000"),
-        ("--push", "nan", "push is 'nan', allowed are finite numbers, in N s"),
-        ("--heavier", "-100", "heavier is '-100', allowed are finite numbers above -100, in %"),
+        ("--push", "nan", "push is 'nan', allowed are finite numbers above -10000 up to 10000, in N s"),
+        ("--push", "1e308", "push is '1e308', allowed are finite numbers above -10000 up to 10000, in N s"),
+        ("--heavier", "-100", "heavier is '-100', allowed are finite numbers above -100 up to 1000, in %"),
+        ("--heavier", "1e308", "heavier is '1e308', allowed are finite numbers above -100 up to 1000, in %"),
         ("--friction", "0", "friction is '0', allowed are finite numbers above 0, without unit"),
     ],
 )
@@ -55,6 +57,15 @@ def test_impossible_numbers_are_refused(option, value, named, tmp_path):
         (["--table", "--without-feedback"], "--table can't be combined with --without-feedback;"),
         (["--table", "--picture", "walk.png"], "--table can't be combined with --picture;"),
         ([*GAIT, "--without-feedback", "--push", "5"], "--without-feedback can't be combined with --push;"),
+        (
+            [*GAIT, "--steps", "2", "--push", "50"],
+            "--push would disturb step 3, the walk has 2; allowed are ",
+        ),
+        ([*GAIT, "--steps", "1", "--step-down", "0.01"], "--step-down would disturb step 3, the walk has 1;"),
+        (
+            [*GAIT, "--steps", "2", "--push", "5", "--step-down", "0.01"],
+            "--push and --step-down would disturb step 3, the walk has 2; allowed are at least 3 steps",
+        ),
     ],
 )
 def test_options_that_would_be_ignored_are_refused(options, named, capsys):

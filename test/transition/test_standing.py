@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from walk_optimizer.errors import ConfigurationError, InvalidRequestError
 from walk_optimizer.mechanics import mechanics_at
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.transition.settings import TransitionSettings
 from walk_optimizer.transition.standing import Standing, standing_pose
 
@@ -48,6 +49,11 @@ def test_no_other_torques_that_hold_the_pose_are_smaller(stand):
 def test_feet_that_the_legs_can_not_reach_are_refused():
     with pytest.raises(InvalidRequestError, match=r"2\.5 m apart, allowed is above 0 and below 2 m"):
         standing_pose(WALKER, 2.5, 0.05)
+
+
+def test_a_stand_on_a_slope_is_refused():
+    with pytest.raises(InvalidRequestError, match="stands and transitions are for level ground"):
+        standing_pose(WalkerParameters(terrain=Terrain(slope=0.05)), 0.1, 0.05)
 
 
 def test_impossible_settings_are_refused():

@@ -57,8 +57,8 @@ def assert_joints_are_continuous(transition: Transition) -> None:
     # Gaits begin where a replay of their torques does best, as close to where they end as certified.
     tolerances = [*[1e-8] * len(transition.steps), 1e-6]
     for ((_, before, one), (after, _, other)), tolerance in zip(pairwise(seen), tolerances, strict=True):
-        left = make_reference(before, one, 0.0, 0.0)
-        right = make_reference(after, other, 0.0, 0.0)
+        left = make_reference(before, one, 0.0, np.zeros(2))
+        right = make_reference(after, other, 0.0, np.zeros(2))
         np.testing.assert_allclose(left.position, right.position, rtol=0, atol=tolerance)
 
 
@@ -86,6 +86,10 @@ def test_every_pair_of_the_table_is_solved(table, stand, gaits):
     pairs = {(pace_name(one), pace_name(other)) for one, other in table_pairs(stand, every)}
     assert len(pairs) == len(SpringMode) * (2 * 7 + 2 * 6)
     assert {(name.source, name.target) for name in table.names()} == pairs
+
+
+def test_gaits_that_are_not_refined_have_no_transitions(stand, gaits):
+    assert table_pairs(stand, [replace(gait, refined=None) for gait in gaits[SPRUNG]]) == []
 
 
 def test_every_speed_on_springs_is_reached_from_the_stand_and_left_to_it(table, stand, gaits):

@@ -109,16 +109,15 @@ def parse_points(text: str) -> int:
     return points
 
 
-def parse_count(text: str, name: str, most: int | None = None) -> int:
+def parse_count(text: str, name: str, most: int) -> int:
     """Return a number of things.
 
     Raises:
-        InvalidRequestError: the text is no whole number from 1 to `most`, where that is given.
+        InvalidRequestError: the text is no whole number from 1 to `most`.
     """
     count = _whole(text)
-    if count is None or count < 1 or (most is not None and count > most):
-        allowed = "of at least 1" if most is None else f"from 1 to {most}"
-        raise InvalidRequestError(f"{name} is {quoted(text)}, allowed are whole numbers {allowed}")
+    if count is None or not 1 <= count <= most:
+        raise InvalidRequestError(f"{name} is {quoted(text)}, allowed are whole numbers from 1 to {most}")
     return count
 
 
@@ -158,7 +157,7 @@ def output_folder(folder: Path) -> Path:
     return folder
 
 
-def parse_number(text: str, name: str, unit: str, above: float = -math.inf) -> float:
+def parse_number(text: str, name: str, unit: str, above: float = -math.inf, most: float = math.inf) -> float:
     """Return a finite number.
 
     Args:
@@ -166,6 +165,7 @@ def parse_number(text: str, name: str, unit: str, above: float = -math.inf) -> f
         name: Of the quantity, for messages.
         unit: What follows in a message, as "in s".
         above: What it must be larger than.
+        most: The largest that is allowed.
 
     Raises:
         InvalidRequestError: the text is no such number.
@@ -174,7 +174,10 @@ def parse_number(text: str, name: str, unit: str, above: float = -math.inf) -> f
         value = float(text)
     except ValueError:
         value = math.nan
-    if not above < value < math.inf:
+    if not (above < value <= most and math.isfinite(value)):
         least = f" above {above:g}" if math.isfinite(above) else ""
-        raise InvalidRequestError(f"{name} is {quoted(text)}, allowed are finite numbers{least}, {unit}")
+        largest = f" up to {most:g}" if math.isfinite(most) else ""
+        raise InvalidRequestError(
+            f"{name} is {quoted(text)}, allowed are finite numbers{least}{largest}, {unit}"
+        )
     return value

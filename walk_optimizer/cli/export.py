@@ -36,7 +36,6 @@ def add_parser(verbs: Subparsers) -> None:
     """Add the verb."""
     parser = add_verb(verbs, "export", _TEXT, _EPILOG)
     add_gait_choice(parser)
-    parser.add_argument("--format", choices=["csv"], default="csv", help="default: csv")
     parser.add_argument("--grid", choices=["report", "refined"], default="report", help="default: report")
     parser.add_argument("--output", type=Path, metavar="FILE", help="default: standard output")
     parser.set_defaults(run=run)

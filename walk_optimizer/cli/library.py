@@ -42,7 +42,7 @@ def add_parser(verbs: Subparsers) -> None:
 
 def run_verify(args: argparse.Namespace) -> int:
     """Verify a folder."""
-    from walk_optimizer.cli.text import aligned, share_of_tolerance, worst_entry
+    from walk_optimizer.cli.text import aligned
     from walk_optimizer.library import table_folder
     from walk_optimizer.request import KMH_PER_MS
     from walk_optimizer.verification import verify_folder
@@ -51,7 +51,7 @@ def run_verify(args: argparse.Namespace) -> int:
     rows = [("m/s", "km/h", "springs", "N", "worst family", "residual", "unit", "of allowed", "")]
     for each in found:
         if each.gait is not None and each.certificate is not None:
-            request, worst = each.gait.request, worst_entry(each.certificate)
+            request, worst = each.gait.request, each.certificate.worst
             rows.append(
                 (
                     f"{request.speed:.4f}",
@@ -61,7 +61,7 @@ def run_verify(args: argparse.Namespace) -> int:
                     worst.family,
                     f"{worst.violation:.2e}",
                     worst.unit,
-                    f"{share_of_tolerance(worst):.1%}",
+                    f"{worst.relative:.1%}",
                     "certified" if each.passed else "FAILED",
                 )
             )

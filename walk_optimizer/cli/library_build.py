@@ -34,16 +34,16 @@ Every speed and spring mode is searched for from scratch, then continued from it
 neighbours until none improves, and refined. A gait is written as soon as it is
 certified and better than the one in the folder: an interrupted build keeps what it has
 found. A further build begins with the gaits that are there too, and never makes the
-table worse. Begin with an empty folder to start over."""
+table worse, on either grid. Begin with an empty folder to start over."""
 
 _EPILOG = """\
 examples:
   walk-optimizer library build
   walk-optimizer library build --output my_table --walker my_walker.yaml"""
 
-# Two solves of one optimum differ by less, relative to F.
-_REPEATED = 1e-8
 _BAR = 30
+# Each is a process of its own, and all are started.
+_MOST_JOBS = 256
 
 
 def add_parser(actions: Subparsers) -> None:
@@ -60,7 +60,7 @@ def add_parser(actions: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Build the table; 1 when entries are missing."""
-    jobs = (os.cpu_count() or 1) if args.jobs is None else parse_count(args.jobs, "jobs")
+    jobs = (os.cpu_count() or 1) if args.jobs is None else parse_count(args.jobs, "jobs", _MOST_JOBS)
     walker = walker_from(args)
     points = None if args.points is None else parse_points(args.points)
 
@@ -117,19 +117,24 @@ class BuildDisplay:
 
 
 def store_better(gait: "Gait", folder: Path) -> bool:
-    """Write a gait, unless the folder holds a certified one of the same request that is better.
+    """Write a gait, as far as the folder holds no certified one of the same request that is as good.
 
-    Better means a smaller F; of gaits with the same F the one is written that has just been refined.
+    Both grids count for themselves: a better refinement is written beside the better gait on the grid.
+
+    Returns:
+        Whether anything was written.
     """
+    from walk_optimizer.comparison import best_of_both
     from walk_optimizer.gait_files import gait_file_name, write_gait_file
     from walk_optimizer.verification import verify_file
 
     path = folder / gait_file_name(gait)
     former = verify_file(path, gait.walker)
     if former.passed and former.gait is not None:
-        better = former.gait.objective < gait.objective * (1 - _REPEATED)
-        if better or (former.gait.objective <= gait.objective and gait.refined is None):
+        best = best_of_both(former.gait, gait)
+        if best is former.gait:
             return False
+        gait = best
     write_gait_file(gait, path)
     return True
 

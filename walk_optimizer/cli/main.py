@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from walk_optimizer import __version__
-from walk_optimizer.errors import WalkOptimizerError
+from walk_optimizer.errors import SolveFailedError, WalkOptimizerError
 
+EXIT_FAILED = 1
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 130
 
@@ -103,7 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except WalkOptimizerError as error:
         print(f"walk-optimizer: {_one_line(error)}", file=sys.stderr)
-        return EXIT_ERROR
+        return EXIT_FAILED if isinstance(error, SolveFailedError) else EXIT_ERROR
     except KeyboardInterrupt:
         print("walk-optimizer: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED

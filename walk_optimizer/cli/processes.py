@@ -111,12 +111,12 @@ class NodeProcess:
         """Return what it has printed so far."""
         return self.log.read_text(encoding="utf-8", errors="replace")
 
-    def stop(self, number: signal.Signals = signal.SIGINT, patience: float = STOP_PATIENCE) -> int:
+    def stop(self, number: signal.Signals = signal.SIGINT) -> int:
         """Ask the process to stop, and return its exit code; one that does not stop in time is killed."""
         with contextlib.suppress(ProcessLookupError):
             self.process.send_signal(number)
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self.process.wait(patience)
+            self.process.wait(STOP_PATIENCE)
         self.kill()
         return self.process.wait()
 

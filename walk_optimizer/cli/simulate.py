@@ -13,13 +13,18 @@ from walk_optimizer.cli.arguments import (
     parse_number,
     refuse_beside,
 )
+from walk_optimizer.errors import InvalidRequestError
 
 if TYPE_CHECKING:
     from walk_optimizer.gait import Gait
     from walk_optimizer.simulation.closed_loop import ClosedLoop
+    from walk_optimizer.simulation.settings import SimulationSettings
     from walk_optimizer.simulation.walk import Disturbance, SimulatedWalk
 
 _MOST_STEPS = 1000
+# Far beyond what any feedback holds: where forces or masses overflow, the integrator never ends a step.
+_LARGEST_PUSH = 1e4  # [N s]
+_MOST_HEAVIER = 1e3  # [%]
 # What says how a whole table is walked; all else is about one gait.
 _OF_TABLES = frozenset({"table", "walker", "library", "friction", "run"})
 
@@ -76,9 +81,9 @@ def run(args: argparse.Namespace) -> int:
         return _print_table(args)
     if args.without_feedback:
         refuse_beside("--without-feedback", args, ("push", "step_down"))
-    push = _amount(args.push, "push", "in N s")
+    push = _amount(args.push, "push", "in N s", above=-_LARGEST_PUSH, most=_LARGEST_PUSH)
     down = _amount(args.step_down, "step down", "in m")
-    heavier = _amount(args.heavier, "heavier", "in %", above=-100.0)
+    heavier = _amount(args.heavier, "heavier", "in %", above=-100.0, most=_MOST_HEAVIER)
     friction = _friction(args)
 
     from walk_optimizer.cli.gaits import chosen_gait
@@ -90,6 +95,7 @@ def run(args: argparse.Namespace) -> int:
         picture_target(args.picture)
     settings = simulation_settings()
     steps = settings.steps if args.steps is None else parse_count(args.steps, "steps", _MOST_STEPS)
+    _refuse_undisturbed(args, steps, settings)
     gait = chosen_gait(args)
     loop = closed_loop(gait, settings).heavier(1 + heavier / 100)
     if friction is not None:
@@ -100,6 +106,22 @@ def run(args: argparse.Namespace) -> int:
     if args.picture is not None:
         _draw(gait, loop, walk, disturbance, args.picture)
     return 1 if walk.ending.is_fall else 0
+
+
+def _refuse_undisturbed(args: argparse.Namespace, steps: int, settings: "SimulationSettings") -> None:
+    """Refuse a disturbance of a step that the walk does not reach.
+
+    Raises:
+        InvalidRequestError: one was given.
+    """
+    disturbed = settings.disturbed_step
+    options = (("--push", args.push), ("--step-down", args.step_down))
+    given = " and ".join(option for option, text in options if text is not None)
+    if given and steps < disturbed:
+        raise InvalidRequestError(
+            f"{given} would disturb step {disturbed}, the walk has {steps}; allowed are at least {disturbed} "
+            "steps"
+        )
 
 
 def _draw(
@@ -150,9 +172,11 @@ def _print_table(args: argparse.Namespace) -> int:
     return 0
 
 
-def _amount(text: str | None, name: str, unit: str, above: float = -math.inf) -> float:
+def _amount(
+    text: str | None, name: str, unit: str, above: float = -math.inf, most: float = math.inf
+) -> float:
     """Return the number of a disturbance; 0 where none is given."""
-    return 0.0 if text is None else parse_number(text, name, unit, above)
+    return 0.0 if text is None else parse_number(text, name, unit, above, most)
 
 
 def _friction(args: argparse.Namespace) -> float | None:

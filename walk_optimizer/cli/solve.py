@@ -12,6 +12,7 @@ from walk_optimizer.cli.arguments import (
     add_verb,
     add_walker,
     positive_seconds,
+    refuse_beside,
     request_from,
     walker_from,
 )
@@ -72,21 +73,31 @@ def add_parser(verbs: Subparsers) -> None:
     parser.set_defaults(run=run)
 
 
+def _refuse_ignored(args: argparse.Namespace) -> None:
+    """Refuse options that would be ignored.
+
+    Raises:
+        InvalidRequestError: one of them was given.
+    """
+    if args.formulation == "report":
+        # It begins with a guess of its own, and shows residuals.
+        refuse_beside("--formulation report", args, ("library", "from_scratch", "save", "export"))
+        if args.solver not in (None, "ipopt"):
+            raise InvalidRequestError("--formulation report is IPOPT's: leave --solver out")
+    if args.from_scratch and not args.save:
+        refuse_beside("--from-scratch without --save", args, ("library",))
+
+
 def solver_settings_from(args: argparse.Namespace) -> "SolverSettings":
     """Return the settings with the chosen back end.
 
     Raises:
-        InvalidRequestError: there is no such back end, or the report's formulation is asked for together
-            with what it can't have.
+        InvalidRequestError: there is no such back end.
         MissingDependencyError: its library is missing.
     """
     if args.solver not in (None, *BACK_ENDS):
         allowed = ", ".join(BACK_ENDS)
         raise InvalidRequestError(f"unknown solver {quoted(args.solver)}; allowed are {allowed}")
-    if args.formulation == "report" and (args.solver not in (None, "ipopt") or args.save or args.export):
-        raise InvalidRequestError(
-            "--formulation report is IPOPT's and shows residuals: leave --solver, --save and --export out"
-        )
 
     from walk_optimizer.solve.settings import solver_settings
 
@@ -102,9 +113,10 @@ def _try_report(
 ) -> int:
     """Solve the report's own formulation and print how far it got."""
     from walk_optimizer.cli.gaits import watched
-    from walk_optimizer.cli.text import certificate_text, gait_text, report_text
+    from walk_optimizer.cli.text import certificate_text, gait_text, report_text, request_text
     from walk_optimizer.reference_solve import solve_reference
 
+    print(request_text(request))
     outcome = watched(
         lambda progress: solve_reference(
             request, walker, settings=settings, time_limit=time_limit, progress=progress
@@ -119,6 +131,7 @@ def _try_report(
 
 def run(args: argparse.Namespace) -> int:
     """Solve, print, store."""
+    _refuse_ignored(args)
     request, walker = request_from(args), walker_from(args)
     time_limit = None if args.time_limit is None else positive_seconds(args.time_limit, "time limit")
     settings = solver_settings_from(args)
@@ -135,13 +148,13 @@ def run(args: argparse.Namespace) -> int:
     from walk_optimizer.gait_files.access import writable_target
     from walk_optimizer.library import GaitLibrary
 
+    if args.formulation == "report":
+        return _try_report(request, walker, settings, time_limit)
     # Before the work, not after it: where the gait goes must be writable.
     library = GaitLibrary(walker, args.library, writable=args.save)
     if args.export:
         writable_target(args.export)
     print(request_text(request))
-    if args.formulation == "report":
-        return _try_report(request, walker, settings, time_limit)
     start_from = None if args.from_scratch else library
     outcome = solve(request, walker, start_from, time_limit, settings)
     print(report_text(outcome.report))

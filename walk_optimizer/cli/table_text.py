@@ -8,14 +8,14 @@ from walk_optimizer.cli.text import aligned, cost, markdown_line, number
 from walk_optimizer.errors import GaitNotFoundError
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import KneeSpring, SpringMode
-from walk_optimizer.report_table import TABLE_I, ReportResult
+from walk_optimizer.report_table import ReportResult, reported
 from walk_optimizer.request import KMH_PER_MS, gait_table_settings
 
 Rows = list[Sequence[str]]
 
 _LEGEND = """\
 {cost}, K in N m/rad, q_eq in rad. F% = 100 F / F of none at the same speed.
-A dash: not in the library."""
+A dash: not in the library, or not in the report."""
 _COSTS = {
     False: "F = sum over the grid points of |u|^2 / 2 in (N m)^2",
     True: "F = integral over the step of |u|^2 / 2 dt in (N m)^2 s, on the refined grid",
@@ -39,9 +39,8 @@ def table_text(library: GaitLibrary, *, refined: bool = False) -> str:
         _block("none", [("F",), *((cost(value),) for value in nominal)]),
     ]
     for mode in (SpringMode.STIFFNESS, SpringMode.STIFFNESS_AND_EQUILIBRIUM):
-        reported = [row.results[mode] for row in TABLE_I]
         blocks.append(_block(mode.value, _our_rows(library, mode, nominal, refined)))
-        blocks.append(_block("report", _report_rows(reported)))
+        blocks.append(_block("report", _report_rows(speeds, mode)))
     return (
         "\n".join(" | ".join(line).rstrip() for line in zip(*blocks, strict=True))
         + f"\n{_LEGEND.format(cost=_COSTS[refined])}"
@@ -57,19 +56,18 @@ def markdown_table(library: GaitLibrary, *, refined: bool = False) -> str:
         ["none: F", "---", *map(cost, nominal)],
     ]
     for mode in (SpringMode.STIFFNESS, SpringMode.STIFFNESS_AND_EQUILIBRIUM):
-        reported = [row.results[mode] for row in TABLE_I]
         head, *ours = _our_rows(library, mode, nominal, refined)
-        marked = [_marked(row, result) for row, result in zip(ours, reported, strict=True)]
+        marked = [_marked(row, _result(speed, mode)) for row, speed in zip(ours, speeds, strict=True)]
         columns.append([f"{mode.value}: {', '.join(head)}", "---", *map(", ".join, marked)])
-        head, *theirs = _report_rows(reported)
+        head, *theirs = _report_rows(speeds, mode)
         columns.append([f"report: {', '.join(head)}", "---", *map(", ".join, theirs)])
     return "\n".join(markdown_line(line) for line in zip(*columns, strict=True))
 
 
-def _marked(row: Sequence[str], reported: ReportResult) -> list[str]:
+def _marked(row: Sequence[str], result: ReportResult | None) -> list[str]:
     """Return a row whose last entry, F%, is bold when it is at or below the report's."""
     *rest, share = row
-    better = share != "-" and float(share) <= reported.relative_objective
+    better = result is not None and share != "-" and float(share) <= result.relative_objective
     return [*rest, f"**{share}**" if better else share]
 
 
@@ -83,9 +81,10 @@ def _block(title: str, rows: Rows) -> list[str]:
 
 def _speed_rows(speeds: Sequence[float]) -> Rows:
     """Return speeds in both units and as the report prints them, cut off after two decimals."""
+    rows = ((speed, reported(speed)) for speed in speeds)
     return [
-        (f"{speed:.4f}", f"{speed * KMH_PER_MS:.2f}", f"{row.speed_kmh:.2f}")
-        for speed, row in zip(speeds, TABLE_I, strict=True)
+        (f"{speed:.4f}", f"{speed * KMH_PER_MS:.2f}", f"{row.speed_kmh:.2f}" if row else "-")
+        for speed, row in rows
     ]
 
 
@@ -104,14 +103,24 @@ def _our_rows(library: GaitLibrary, mode: SpringMode, nominal: Sequence[float], 
     return rows
 
 
-def _report_rows(results: Sequence[ReportResult]) -> Rows:
+def _report_rows(speeds: Sequence[float], mode: SpringMode) -> Rows:
     """Return K, q_eq where it was free, and F% of the report."""
-    free = results[0].equilibrium is not None
+    free = mode is SpringMode.STIFFNESS_AND_EQUILIBRIUM
     rows: Rows = [("K", *(["q_eq"] if free else []), "F%")]
-    for result in results:
+    for speed in speeds:
+        result = _result(speed, mode)
+        if result is None:
+            rows.append(["-"] * len(rows[0]))
+            continue
         equilibrium = [f"{result.equilibrium:.2f}"] if free else []
         rows.append((f"{result.stiffness:.2f}", *equilibrium, f"{result.relative_objective:.0f}"))
     return rows
+
+
+def _result(speed: float, mode: SpringMode) -> ReportResult | None:
+    """Return what the report found; None where it has no such speed."""
+    row = reported(speed)
+    return row.results[mode] if row else None
 
 
 def _nominal(library: GaitLibrary, speeds: Sequence[float], refined: bool) -> list[float]:

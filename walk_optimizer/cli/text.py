@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from walk_optimizer.gait import Certificate, CertificateEntry, Gait
+from walk_optimizer.gait import Certificate, Gait
 from walk_optimizer.request import KMH_PER_MS, GaitRequest
 from walk_optimizer.solve.status import SolveReport
 
@@ -39,11 +39,11 @@ def refinement_text(gait: Gait) -> str:
     """Return what refining a gait led to, as one line."""
     if gait.refined is None:
         return "no: what is walked is the gait on the report's grid"
-    refined, worst = gait.refined, worst_entry(gait.refined.certificate)
+    refined, worst = gait.refined, gait.refined.certificate.worst
     return (
         f"{refined.trajectory.intervals} intervals, torque effort "
         f"{refined.trajectory.torque_effort:.6g} (report's grid: {gait.torque_effort:.6g}), "
-        f"{worst.family} at {share_of_tolerance(worst):.0%} of its limit"
+        f"{worst.family} at {worst.relative:.0%} of its limit"
     )
 
 
@@ -69,16 +69,6 @@ def certificate_text(certificate: Certificate) -> str:
         for entry in certificate.entries
     ]
     return aligned([("certificate", "residual", "allowed", "unit", ""), *rows], left=(0, 3, 4))
-
-
-def worst_entry(certificate: Certificate) -> CertificateEntry:
-    """Return the family that comes closest to its tolerance, or is furthest beyond it."""
-    return max(certificate.entries, key=share_of_tolerance)
-
-
-def share_of_tolerance(entry: CertificateEntry) -> float:
-    """Return the residual as a fraction of what is allowed; infinite when it is not a number."""
-    return math.inf if math.isnan(entry.violation) else entry.violation / entry.tolerance
 
 
 def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = ()) -> str:

@@ -56,11 +56,12 @@ def add_parser(verbs: Subparsers) -> None:
 def _table(args: argparse.Namespace) -> "tuple[TransitionTable, list[tuple[Pace, Pace]]]":
     """Return the table and which paces it should join."""
     from walk_optimizer.library import GaitLibrary
+    from walk_optimizer.simulation.table import table_gaits
     from walk_optimizer.transition.builder import table_pairs
     from walk_optimizer.transition.table import TransitionTable, packaged_stand
 
     walker = walker_from(args)
-    pairs = table_pairs(packaged_stand(walker), GaitLibrary(walker).gaits())
+    pairs = table_pairs(packaged_stand(walker), table_gaits(GaitLibrary(walker)))
     return TransitionTable(walker, args.folder), pairs
 
 
@@ -98,16 +99,16 @@ def run_list(args: argparse.Namespace) -> int:
 
 def run_verify(args: argparse.Namespace) -> int:
     """Verify the transitions."""
-    from walk_optimizer.cli.text import aligned, share_of_tolerance, worst_entry
+    from walk_optimizer.cli.text import aligned
     from walk_optimizer.transition.builder import recomputed
 
     rows: list[tuple[str, ...]] = [("from", "to", "worst family", "residual", "unit", "of allowed", "")]
     failed = 0
     for each in _solved(args):
         certificate = recomputed(each)
-        worst, passed = worst_entry(certificate), certificate.certified
+        worst, passed = certificate.worst, certificate.certified
         failed += not passed
-        residual = (worst.family, f"{worst.violation:.2e}", worst.unit, f"{share_of_tolerance(worst):.1%}")
+        residual = (worst.family, f"{worst.violation:.2e}", worst.unit, f"{worst.relative:.1%}")
         rows.append((*_row(each), *residual, "certified" if passed else "FAILED"))
     print(aligned(rows, left=(0, 1, 2, 4, 6)))
     print(f"{len(rows) - 1} transitions, {len(rows) - 1 - failed} certified, {failed} failed")

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from walk_optimizer.errors import InvalidRequestError, quoted
@@ -61,7 +61,8 @@ def solve_example(name: str, time_limit: float | None = None) -> Example:
         disc = move_disc(Finger(), FingerTask(), session)
         return Example(disc.finding, lambda path: pictures.draw_finger(disc, path))
     if name in TERRAINS:
-        gait = find_contacts(WalkerParameters(terrain=TERRAINS[name]), _STEP, _SHAPE, session)
+        walker = replace(WalkerParameters.from_yaml(), terrain=TERRAINS[name])
+        gait = find_contacts(walker, _STEP, _SHAPE, session)
         return Example(gait.finding, lambda path: pictures.draw_walk(gait, path))
     if name == "standing-start":
         start = set_off(WalkerParameters.from_yaml(), StandingStart(), session)

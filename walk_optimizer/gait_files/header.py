@@ -6,6 +6,7 @@ from enum import Enum
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from walk_optimizer.errors import GaitFileError, WalkOptimizerError
+from walk_optimizer.resources import as_float
 
 Value = TypeVar("Value")
 
@@ -85,10 +86,7 @@ def _number(plain: Any, where: str, may_be_nan: bool) -> float:
         return math.nan
     if isinstance(plain, bool) or not isinstance(plain, int | float):
         raise GaitFileError(f"{where} is {plain!r}, expected a finite number")
-    try:
-        number = float(plain)
-    except OverflowError:
-        number = math.inf
+    number = as_float(plain)
     if not math.isfinite(number):
         raise GaitFileError(f"{where} is {number}, expected a finite number")
     return number

@@ -10,7 +10,7 @@ from typing import Any
 
 from walk_optimizer.errors import ConfigurationError, InvalidRequestError, quoted
 from walk_optimizer.model.terrain import Terrain
-from walk_optimizer.resources import config_file, read_yaml, settings_from_entries, text_hint
+from walk_optimizer.resources import as_float, config_file, read_yaml, settings_from_entries, text_hint
 
 
 class SpringMode(StrEnum):
@@ -208,8 +208,9 @@ def _finite(name: str, value: Any, *, zero: bool) -> float:
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ConfigurationError(f"walker parameter {name} is {value!r}, expected a number{text_hint(value)}")
-    if not (math.isfinite(value) and (value > 0 or (zero and value == 0))):
+    number = as_float(value)
+    if not (math.isfinite(number) and (number > 0 or (zero and number == 0))):
         allowed = "0 and finite numbers above" if zero else "finite numbers above 0"
-        raise ConfigurationError(f"walker parameter {name} is {value}, allowed are {allowed}")
+        raise ConfigurationError(f"walker parameter {name} is {number}, allowed are {allowed}")
     # Adding 0.0 makes a zero of a negative zero.
-    return float(value) + 0.0
+    return number + 0.0

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from walk_optimizer.errors import ConfigurationError
-from walk_optimizer.resources import text_hint
+from walk_optimizer.resources import as_float, text_hint
 
 if TYPE_CHECKING:
     import numpy as np
@@ -101,6 +101,7 @@ def _finite(name: str, value: Any) -> float:
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ConfigurationError(f"terrain {name} is {value!r}, expected a number{text_hint(value)}")
-    if not math.isfinite(value):
-        raise ConfigurationError(f"terrain {name} is {value}, allowed are finite numbers")
-    return float(value)
+    number = as_float(value)
+    if not math.isfinite(number):
+        raise ConfigurationError(f"terrain {name} is {number}, allowed are finite numbers")
+    return number

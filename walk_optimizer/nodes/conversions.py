@@ -212,11 +212,20 @@ def refusal_to_message(error: WalkOptimizerError) -> SolverReportMessage:
 
 
 def report_from_message(message: SolverReportMessage) -> SolveReport:
-    """Return the solver report of a message."""
-    rows = zip(message.family, message.violation, message.unit, strict=True)
+    """Return the solver report of a message.
+
+    Raises:
+        GaitFileError: its status is unknown, or its columns are not equally long.
+    """
+    columns = (message.family, message.violation, message.unit)
+    if len(set(map(len, columns))) > 1:
+        raise GaitFileError("solver report: the columns of its violations are not equally long")
+    known = [status.value for status in Status]
+    if message.status not in known:
+        raise GaitFileError(f"solver report: no status {message.status!r}; there are {', '.join(known)}")
     values: dict[str, Any] = {
         "status": Status(message.status),
-        "violations": tuple(FamilyViolation(*row) for row in rows),
+        "violations": tuple(FamilyViolation(*row) for row in zip(*columns, strict=True)),
     }
     same = {one.name for one in fields(SolveReport)} - values.keys()
     return SolveReport(**values, **{name: getattr(message, name) for name in same})

@@ -33,7 +33,7 @@ OPTIMIZER = "optimizer"
 
 _TABLE = gait_table_settings()
 # Gaits that one request may have rebuilt: the table three times over.
-_MOST_REBUILT = 63
+_MOST_REBUILT = 3 * _TABLE.gaits * len(SpringMode)
 _FREE_SPACE = "make the folder writable or free space, then call ~/rebuild for them"
 
 SETTINGS = [

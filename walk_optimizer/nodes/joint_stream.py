@@ -120,9 +120,13 @@ class JointStream:
         """
         kept = [self._known.get(profile) for profile in (self.walk.pace, self.walk.goal)]
         gaits = [one for one in (*kept, goal) if isinstance(one, StreamedGait)]
-        # Replaced as a whole, for the stream's thread; former gaits are forgotten.
-        self._known = {gait.profile: gait for gait in gaits}
-        return self.walk.follow(plan)
+        # Replaced as a whole, for the stream's thread, and before it may walk the plan; former gaits are
+        # forgotten.
+        before, self._known = self._known, {gait.profile: gait for gait in gaits}
+        followed = self.walk.follow(plan)
+        if not followed:
+            self._known = before
+        return followed
 
     def announce_again(self) -> None:
         """Publish once more what is latched, so that a bag which has just begun holds it."""

@@ -1,15 +1,29 @@
-"""Which parameters of `reference_publisher` go together, and what may be changed while it is active."""
+"""Which walkers `reference_publisher` takes, and which of its parameters go together or may be changed."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from walk_optimizer.errors import ConfigurationError
+from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.parameters import NodeParameters
 from walk_optimizer.nodes.publisher_settings import LEAST_PERIODS
 
 RATE_SETTINGS = {"rate", "longest_gap"}
 # What a message says with six digits is to be allowed when it is followed.
 _ROUNDING = 1e-5
+
+
+def require_level_ground(walker: WalkerParameters) -> None:
+    """Refuse a walker on a slope or stairs: it could neither stand there nor change its speed.
+
+    Raises:
+        ConfigurationError: says what can be done with its gaits.
+    """
+    if not walker.terrain.is_flat:
+        raise ConfigurationError(
+            "the walker's terrain is a slope or stairs; gaits there are solved, exported and simulated, but "
+            "not streamed, for stands and the steps between paces are for level ground"
+        )
 
 
 def require_no_late_start(parameters: NodeParameters, changes: Mapping[str, Any]) -> None:

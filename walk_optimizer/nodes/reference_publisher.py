@@ -17,7 +17,12 @@ from walk_optimizer.nodes.bag import StreamBag
 from walk_optimizer.nodes.cycle_message import CycleMessages
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.lifecycle import ManagedNode, NotActiveError
-from walk_optimizer.nodes.publisher_checks import RATE_SETTINGS, require_no_late_start, require_steady
+from walk_optimizer.nodes.publisher_checks import (
+    RATE_SETTINGS,
+    require_level_ground,
+    require_no_late_start,
+    require_steady,
+)
 from walk_optimizer.nodes.publisher_health import PublisherHealth
 from walk_optimizer.nodes.publisher_settings import (
     FORMAT_SETTINGS,
@@ -57,8 +62,14 @@ class ReferencePublisherNode(ManagedNode):
         self.parameters.apply_changes(self._apply)
 
     def configure(self) -> None:
-        """Create topics and services."""
+        """Create topics and services.
+
+        Raises:
+            ConfigurationError: the walker's file can't be used, or its terrain is not level.
+            GaitFileError: the cache folder can't be used.
+        """
         walker = walker_of(self.parameters["walker_file"])
+        require_level_ground(walker)
         self._bag = StreamBag()
         self._stream = JointStream(self, self._bag, self._phase_clock)
         library = self.connect(GetGait, self.parameters["library_service"])

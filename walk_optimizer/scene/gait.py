@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.gait import Gait
-from walk_optimizer.mechanics import foot_arm
+from walk_optimizer.mechanics import foot_arm, horizontal_and_vertical
 from walk_optimizer.profile import RefinedProfile, StepProfile, profile_of
 from walk_optimizer.references import sample_cycle
 
@@ -100,5 +100,5 @@ class ShownGait:
         if refined is not None and isinstance(self.profile, RefinedProfile):
             return refined.trajectory.force(*refined.trajectory.locate(time)).reshape(2, 2)
         index = int(np.searchsorted(euler.time, time))
-        net = euler.net_reaction()
+        net = horizontal_and_vertical(self._gait.walker, euler.net_reaction())
         return net[:, min(index, net.shape[1] - 1)].reshape(2, 2)

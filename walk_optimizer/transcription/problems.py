@@ -82,7 +82,7 @@ def spring_bounds(mode: SpringMode, walker: WalkerParameters) -> tuple[KneeSprin
 
 
 class _Bounds:
-    """Bounds under construction: points (23, N) and rows (28, N); a row without bounds is left out."""
+    """Bounds under construction: points (23, N) and rows (32, N); a row without bounds is left out."""
 
     def __init__(self, request: GaitRequest, walker: WalkerParameters) -> None:
         self.request, self.walker = request, walker

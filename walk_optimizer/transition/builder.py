@@ -5,7 +5,6 @@ from itertools import pairwise
 
 from walk_optimizer.gait import Certificate, Gait
 from walk_optimizer.model.parameters import SpringMode
-from walk_optimizer.solve.status import ProgressCallback
 from walk_optimizer.transition.certificate import certify_steps
 from walk_optimizer.transition.paces import Pace
 from walk_optimizer.transition.solve import plan_transition
@@ -17,11 +16,17 @@ from walk_optimizer.transition.transition import Transition, TransitionOutcome
 def table_pairs(stand: Standing, gaits: Sequence[Gait]) -> list[tuple[Pace, Pace]]:
     """Return which paces the packaged transitions join.
 
-    From the stand into every gait and back, and of each spring mode from every speed to the next ones.
+    From the stand into every gait and back, and of each spring mode from every speed to the next ones. Gaits
+    that are not refined have none.
+
+    Args:
+        stand: Where walks begin and end.
+        gaits: Of the table, one of a speed and mode.
     """
     pairs: list[tuple[Pace, Pace]] = []
+    refined = sorted((g for g in gaits if g.refined is not None), key=lambda gait: gait.request.speed)
     for mode in SpringMode:
-        own = sorted((g for g in gaits if g.request.spring_mode is mode), key=lambda gait: gait.request.speed)
+        own = [gait for gait in refined if gait.request.spring_mode is mode]
         for gait in own:
             pairs += [(stand, gait), (gait, stand)]
         for slower, faster in pairwise(own):
@@ -30,7 +35,7 @@ def table_pairs(stand: Standing, gaits: Sequence[Gait]) -> list[tuple[Pace, Pace
 
 
 def build_table(
-    table: TransitionTable, pairs: Sequence[tuple[Pace, Pace]], progress: ProgressCallback | None = None
+    table: TransitionTable, pairs: Sequence[tuple[Pace, Pace]]
 ) -> Iterator[tuple[Pace, Pace, TransitionOutcome]]:
     """Solve and store the transitions that a table lacks, one after the other.
 
@@ -39,7 +44,7 @@ def build_table(
     """
     for source, target in pairs:
         if table.find(source, target) is None:
-            outcome = plan_transition(table.walker, source, target, progress=progress)
+            outcome = plan_transition(table.walker, source, target)
             if outcome.transition is not None:
                 table.store(outcome.transition)
             yield source, target, outcome

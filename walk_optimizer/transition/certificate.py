@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from walk_optimizer.certificate import landing_speed_entries, stance_load_entries
 from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
-from walk_optimizer.mechanics import along_and_normal, mechanics_at
+from walk_optimizer.mechanics import along_and_normal, foot_2_ahead, mechanics_at
 from walk_optimizer.model.kinematics import HIP_X, HIP_Y
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.refined_certificate import (
@@ -26,7 +26,6 @@ from walk_optimizer.transition.paces import (
     end_state,
     next_step_sees,
     refined_of,
-    step_length,
     velocity,
 )
 from walk_optimizer.transition.standing import Standing
@@ -93,7 +92,7 @@ def _step_entries(
     nodes = trajectory.states[:, 1:].reshape(-1, 12).T
     mechanics = mechanics_at(walker, step.spring, nodes[:6], nodes[6:])
     forces = trajectory.forces.reshape(-1, 4).T
-    landing = step_length(walker, trajectory.states[-1, -1]) - step.step_length
+    landing = foot_2_ahead(walker, trajectory.states[-1, -1]) - step.step_length
     torque = max(0.0, float((torque_peaks(trajectory) - each_torque(torque_limit)).max()))
     return [
         *collocation_entries(walker, trajectory, mechanics),

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from walk_optimizer.gait import Certificate, RefinedGait
+from walk_optimizer.mechanics import foot_2_ahead
 from walk_optimizer.model.kinematics import HIP_X
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.refined_trajectory import RefinedTrajectory
@@ -20,7 +21,6 @@ from walk_optimizer.transition.paces import (
     Pace,
     border_state,
     former_step_sees,
-    step_length,
     velocity,
     with_legs_exchanged,
 )
@@ -59,7 +59,7 @@ def steps_of(
     steps, origin = [], 0.0
     for number, (first, end) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
         step = _seen_from(_cut(trajectory, int(first), int(end)), origin, exchanged=number % 2 == 1)
-        length = step_length(walker, step.states[-1, -1])
+        length = foot_2_ahead(walker, step.states[-1, -1])
         steps.append(RefinedGait(step, spring, length, Certificate(())))
         origin += length
     return steps

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import Gait, RefinedGait
-from walk_optimizer.mechanics import foot_arm, mechanics_at
+from walk_optimizer.mechanics import foot_2_ahead, foot_arm, mechanics_at
 from walk_optimizer.model.functions import mass_matrices
 from walk_optimizer.model.kinematics import HIP_X, RELABELLED, UPPER_2
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
@@ -98,21 +98,16 @@ def next_step_sees(walker: WalkerParameters, state: FloatArray) -> FloatArray:
     The legs exchange names, and the origin is where foot 2 stands.
     """
     seen: FloatArray = state[EXCHANGED]
-    seen[HIP_X] -= step_length(walker, state)
+    seen[HIP_X] -= foot_2_ahead(walker, state)
     return seen
 
 
 def former_step_sees(walker: WalkerParameters, state: FloatArray) -> FloatArray:
-    """Return the state (12,) before a step as the step before it sees it: undoes `next_step_sees`."""
-    foot_behind = foot_arm(walker, state[:6, None], 1).position[0, 0]
-    seen: FloatArray = state[EXCHANGED]
-    seen[HIP_X] -= foot_behind
-    return seen
+    """Return the state (12,) before a step as the step before it sees it: undoes `next_step_sees`.
 
-
-def step_length(walker: WalkerParameters, state: FloatArray) -> float:
-    """Return where foot 2 is in a state (12,), in [m] ahead of the origin."""
-    return float(foot_arm(walker, state[:6, None], 1).position[0, 0])
+    Foot 2, which is behind now, stands where the origin was then.
+    """
+    return next_step_sees(walker, state)
 
 
 def velocity(walker: WalkerParameters, state: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ from scipy.optimize import minimize_scalar
 
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import read_only
-from walk_optimizer.mechanics import foot_arm, mechanics_at
+from walk_optimizer.mechanics import foot_2_ahead, mechanics_at
 from walk_optimizer.model.dynamics import INPUT_MAP
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 
@@ -51,7 +51,7 @@ class Standing:
     @property
     def feet_distance(self) -> float:
         """How far foot 2 is behind foot 1, in [m]."""
-        return -float(foot_arm(self.walker, self.q[:, None], 1).position[0, 0])
+        return -foot_2_ahead(self.walker, self.state)
 
     def on(self, spring: KneeSpring) -> "Standing":
         """Return the same pose held with another knee spring."""
@@ -72,8 +72,12 @@ def standing_pose(walker: WalkerParameters, feet_distance: float, knee_bend: flo
             the edge of what the legs reach, where no motion can come to rest.
 
     Raises:
-        InvalidRequestError: the legs don't reach so far apart.
+        InvalidRequestError: the legs don't reach so far apart, or the walker's terrain is not level.
     """
+    if not walker.terrain.is_flat:
+        raise InvalidRequestError(
+            "stands and transitions are for level ground, the walker's terrain is not level"
+        )
     if not 0 < feet_distance < walker.longest_step:
         raise InvalidRequestError(
             f"feet are {feet_distance:g} m apart, allowed is above 0 and below {walker.longest_step:g} m"
