@@ -33,21 +33,22 @@ def draw_poses(axes: "Axes", gait: Gait) -> None:
         axes.plot(*stance, color=STANCE_COLOUR, linewidth=3.0, solid_capstyle="round", zorder=4)
         axes.plot(*stance[:, 1], "o", color="white", markersize=2, zorder=5)
         axes.plot(*stance[:, 0], "o", color="black", markersize=7, zorder=6)
-        _draw_ground(axes, gait, spacing, shift[0, 0])
+        # The outermost pieces reach as far as the swing foot.
+        begin, end = -1.0 if place == 0 else -0.5, 1.0 if index == chosen[-1] else 0.5
+        _draw_ground(axes, gait, spacing * np.linspace(begin, end, 60), shift[0, 0])
     axes.set_xticks(
         spacing * np.arange(len(chosen)), [f"{gait.trajectory.time[index]:.2f}" for index in chosen]
     )
     axes.set_aspect("equal")
     axes.grid(visible=False)
-    lowest = gait.walker.terrain.height(np.array([-spacing, spacing]) / 2, gait.request.step_length).min()
+    lowest = gait.walker.terrain.height(np.array([-spacing, spacing]), gait.request.step_length).min()
     axes.set_ylim(lowest - 0.06 * length, 1.1 * length)
     axes.set(title="One step", xlabel="time [s]", ylabel="height [m]")
     _name_legs(axes)
 
 
-def _draw_ground(axes: "Axes", gait: Gait, width: float, shift: float) -> None:
-    """Draw the piece of ground about the stance foot of a pose, both in [m], at its place in the picture."""
-    places = np.linspace(-width / 2, width / 2, 60)
+def _draw_ground(axes: "Axes", gait: Gait, places: FloatArray, shift: float) -> None:
+    """Draw the ground at places from the stance foot of a pose, both in [m], at its place in the picture."""
     height = gait.walker.terrain.height(places, gait.request.step_length)
     axes.plot(places + shift, height, color="black", linewidth=1.2, zorder=1)
 

@@ -8,7 +8,7 @@ from walk_optimizer.library_entries import Source
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.worker import BusyError
 
-# A blend takes about a second and as little memory as a gait.
+# A blend takes about a tenth of a second, and as little memory as a gait.
 _WAITING_LIMIT = 16
 _REMEMBERED = 64
 
