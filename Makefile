@@ -22,7 +22,7 @@ help:
 	@echo "make lint        ruff and mypy"
 	@echo "make format      let ruff format the code"
 	@echo "make interfaces  make .venv and build the ROS interfaces, nothing else"
-	@echo "make clean       remove .venv and what builds left behind"
+	@echo "make clean       remove .venv and what builds left behind; log/ stays, for it holds recordings"
 
 interfaces:
 	@$(PYTHON) tools/bootstrap.py
@@ -42,5 +42,6 @@ format: interfaces
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
+# Not log/: the demonstration's bags are there, beside the logs of colcon.
 clean:
-	rm -rf .venv build install log dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf .venv build install dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis

@@ -5,6 +5,7 @@
 Prints the table of docs/any_speed.md.
 """
 
+import argparse
 import time
 from itertools import pairwise
 
@@ -22,6 +23,7 @@ PER_GAP = 9
 
 def main():
     """Ask for speeds between those of the table, in every mode."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     speeds = gait_table_settings().table_speeds()
     print(f"| springs | blended between | of {PER_GAP} speeds | time [s] | {' | '.join(FAMILIES)} |")
     print("| --- | --- | --- | --- |" + " --- |" * len(FAMILIES))

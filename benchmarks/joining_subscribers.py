@@ -6,6 +6,7 @@ long before listens on. All are processes of their own, over shared memory and o
     .venv/bin/python benchmarks/joining_subscribers.py    # 4 minutes; writes docs/benchmarks/
 """
 
+import argparse
 import os
 import tempfile
 import time
@@ -78,6 +79,7 @@ def line(transport: str, publisher: str, topic: str) -> list[str]:
 
 def main() -> None:
     """Measure, print, and save."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     head = machine(("ros-rclpy", "ros-rmw-fastrtps-cpp", "ros-fastrtps"))
     rows = []
     for transport, variables in TRANSPORTS.items():

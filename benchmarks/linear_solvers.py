@@ -5,6 +5,7 @@ The same programs from the same starts by the same IPOPT; only the linear solver
     .venv/bin/python benchmarks/linear_solvers.py
 """
 
+import argparse
 import time
 from dataclasses import dataclass
 from functools import partial
@@ -108,6 +109,7 @@ def rows_of(case: Case) -> list[list[str]]:
 
 def main() -> None:
     """Measure all cases and save the page."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     where = machine()
     cases = [
         *(schedule_case(points) for points in SIZES),

@@ -161,8 +161,8 @@ def _about_table(gaits: ModeGaits) -> str:
     by_equilibrium = _lowered(gaits, SpringMode.STIFFNESS, SpringMode.STIFFNESS_AND_EQUILIBRIUM)
     stiffness = [gait.spring.stiffness for gait in gaits[SpringMode.STIFFNESS_AND_EQUILIBRIUM]]
     return (
-        f"Agrees: springs lower F at {by_stiffness} of {len(nominal)} speeds, and a free equilibrium lowers it "
-        f"further at {by_equilibrium}. "
+        f"Agrees: springs lower F at {by_stiffness} of {len(nominal)} speeds, and a free equilibrium lowers "
+        f"it further at {by_equilibrium}. "
         f"Differs: {better} of {len(shares)} of our F% are at or below the report's, with stiffer springs "
         f"(free equilibrium: {min(stiffness):.0f} to {max(stiffness):.0f} N m/rad). "
         "F% relates two optima, so a better gait without springs raises it: F itself, which the report does "

@@ -5,7 +5,10 @@ import sys
 import time
 from pathlib import Path
 
-SPEED = Path(__file__).resolve().parents[2] / "benchmarks" / "speed.py"
+import pytest
+
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+SPEED = BENCHMARKS / "speed.py"
 
 
 def test_a_measurement_past_its_time_limit_is_killed_and_says_so():
@@ -60,6 +63,16 @@ def test_an_unknown_part_is_refused_with_the_parts_that_there_are():
     )
     assert run.returncode == 2
     assert "unknown part colder; there are cold,table,resolve,growth,startup" in run.stderr
+
+
+@pytest.mark.parametrize("name", ["blended_speeds", "joining_subscribers", "linear_solvers"])
+def test_a_benchmark_without_options_does_not_begin_when_one_is_given(name):
+    if name == "joining_subscribers":
+        pytest.importorskip("rclpy")
+    for argument, code, told in (("--help", 0, "usage: "), ("--quick", 2, "unrecognized arguments: --quick")):
+        command = [sys.executable, BENCHMARKS / f"{name}.py", argument]
+        run = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+        assert (run.returncode, told in run.stdout + run.stderr) == (code, True)
 
 
 def test_a_random_request_without_a_gait_stays_in_the_table_with_the_reason():

@@ -19,8 +19,8 @@ NODE = "walker_visualizer"
 
 
 @functools.cache
-def packaged_gait():
-    gait, _ = GaitLibrary(WalkerParameters()).find(0.32, "stiffness_and_equilibrium", "nearest")
+def packaged_gait(speed=0.32):
+    gait, _ = GaitLibrary(WalkerParameters()).find(speed, "stiffness_and_equilibrium", "nearest")
     return gait
 
 
@@ -35,9 +35,10 @@ def nanoseconds_of(stamp):
 class Walk:
     """A publisher of references, of this test: it says what it walks, and when."""
 
-    def __init__(self, graph, namespace=""):
+    def __init__(self, graph, namespace="", gait=None):
         prefix = f"/{namespace}/" if namespace else ""
-        self.graph, self.profile = graph, profile_of(packaged_gait())
+        self.gait = gait or packaged_gait()
+        self.graph, self.profile = graph, profile_of(self.gait)
         self.references = {}
         self.gaits = graph.publisher(GaitMessage, f"{prefix}reference_publisher/gait", LATCHED)
         self.joints = graph.publisher(JointState, f"{prefix}reference_publisher/joint_reference", STREAM)
@@ -46,21 +47,26 @@ class Walk:
         graph.spin_for(0.5)
 
     def announce(self):
-        self.gaits.publish(gait_to_message(packaged_gait()))
+        self.gaits.publish(gait_to_message(self.gait))
         self.graph.spin_for(0.5)
 
-    def send(self, time, order=(0, 1, 2, 3)):
-        """Publish the reference of a time in [s], and wait for the picture."""
+    def publish(self, time, order=(0, 1, 2, 3), fields=("position", "velocity", "effort")):
+        """Publish the reference of a time in [s]."""
         cycles, rest = divmod(time, 2 * self.profile.step_time)
         reference = cycle_reference(self.profile, rest)
         stamp = round(time * 1e9) + 10**12
         message = JointState(name=[JOINTS[place] for place in order])
-        for field in ("position", "effort"):
+        for field in fields:
             setattr(message, field, [float(getattr(reference, field)[place]) for place in order])
         message.header.stamp = stamp_of(stamp)
         self.references[stamp] = reference, reference.base[0] + 2 * cycles * self.profile.step_length
-        before = len(self.markers)
         self.joints.publish(message)
+        return reference
+
+    def send(self, time, **form):
+        """Publish the reference of a time in [s], and wait for the picture."""
+        before = len(self.markers)
+        reference = self.publish(time, **form)
         self.graph.spin_until(
             lambda: len(self.markers) > before and len(self.transforms) >= len(self.markers), "a picture"
         )

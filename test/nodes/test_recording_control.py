@@ -15,6 +15,8 @@ pytest.importorskip("rclpy")
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Twist, Vector3
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from nodes.graph import SETTLING
 from nodes.walking import NODE
 from rcl_interfaces.msg import Log
@@ -251,6 +253,67 @@ def wait_for(graph, heard, level, words):
     graph.spin_until(
         lambda: graph.get_parameter(NODE, "record").bool_value == recording, "the parameter `record`", 30.0
     )
+
+
+def change(graph, *transitions):
+    for transition in transitions:
+        request = Transition(id=transition)
+        assert graph.call(ChangeState, f"{NODE}/change_state", transition=request).success
+
+
+def recording_wanted(graph):
+    return graph.get_parameter(NODE, "record").bool_value
+
+
+@pytest.mark.parametrize("asked_by", ["service", "parameter", "both"])
+def test_only_what_the_parameter_has_asked_for_is_recorded_after_another_activation(
+    graph, publisher, tmp_path, asked_by
+):
+    heard = graph.subscribe(DiagnosticArray, "/diagnostics")
+    default = tmp_path / "default"
+    graph.set_parameters(NODE, Parameter("recording_folder", value=str(default)))
+    if asked_by in ("service", "both"):
+        assert graph.call(StartRecording, START, directory=str(tmp_path / "named")).success
+    if asked_by in ("parameter", "both"):
+        record(graph, default)
+    wait_for(graph, heard, DiagnosticStatus.OK, "recording to")
+    change(graph, Transition.TRANSITION_DEACTIVATE)
+    kept = asked_by != "service"
+    assert recording_wanted(graph) == kept
+    before = set(default.glob("*"))
+    change(graph, Transition.TRANSITION_ACTIVATE)
+    wait_for(graph, heard, DiagnosticStatus.OK, "recording to" if kept else "not recording")
+    assert len(set(default.glob("*")) - before) == kept
+
+
+def test_what_the_parameter_asks_for_while_the_node_is_inactive_outlives_a_cleanup(
+    graph, publisher, tmp_path
+):
+    heard = graph.subscribe(DiagnosticArray, "/diagnostics")
+    assert graph.call(StartRecording, START, directory=str(tmp_path / "named")).success
+    change(graph, Transition.TRANSITION_DEACTIVATE)
+    record(graph, tmp_path / "default")
+    change(graph, Transition.TRANSITION_CLEANUP, Transition.TRANSITION_CONFIGURE)
+    assert recording_wanted(graph)
+    change(graph, Transition.TRANSITION_ACTIVATE)
+    wait_for(graph, heard, DiagnosticStatus.OK, f"recording to {tmp_path / 'default'}")
+
+
+def test_a_deactivation_while_a_bag_is_being_closed_leaves_nothing_to_record(
+    graph, disk, publisher, tmp_path
+):
+    assert graph.call(StartRecording, START, directory=str(tmp_path / "bag")).success
+    graph.client(ChangeState, f"{NODE}/change_state")
+    graph.client(StopRecording, STOP)
+    assert recording_wanted(graph)
+    disk.hold()
+    answer = graph.send(StopRecording, STOP)
+    graph.spin_until(disk.waited_for.is_set, "the disk")
+    threading.Timer(0.3, disk.release).start()
+    change(graph, Transition.TRANSITION_DEACTIVATE)
+    graph.result(answer)
+    assert not recording_wanted(graph)
+    assert describe_bag(tmp_path / "bag").is_whole
 
 
 def test_a_bag_that_can_not_be_begun_is_told_and_not_claimed(graph, publisher, tmp_path):

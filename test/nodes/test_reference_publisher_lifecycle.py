@@ -57,11 +57,12 @@ def test_a_manager_decides_when_references_are_streamed(graph, start, stocked, t
     assert walker.states[-1].message == "nothing is streamed, the node is not active"
     diagnostics = graph.subscribe(DiagnosticArray, "/diagnostics")
 
-    def told():
-        walk = [one for array in diagnostics for one in array.status if one.name == f"{NODE}: walk"]
-        return walk and walk[-1].message == walker.states[-1].message
+    def told(check, message):
+        found = [one for array in diagnostics for one in array.status if one.name == f"{NODE}: {check}"]
+        return found and found[-1].message == message
 
-    graph.spin_until(told, "the diagnostics")
+    graph.spin_until(lambda: told("walk", walker.states[-1].message), "the diagnostics of the walk")
+    graph.spin_until(lambda: told("timing", "nothing is streamed"), "the diagnostics of the timing")
     graph.spin_for(0.3)
     joints.clear()
     graph.spin_for(0.3)

@@ -179,6 +179,7 @@ def test_joints_are_matched_by_name_and_a_message_without_them_is_refused(walk):
         JointState(name=["left_hip"], position=[0.1]),
         JointState(name=list(JOINTS), position=[0.1, float("nan"), 0.1, 3.0]),
         JointState(name=list(JOINTS), position=[]),
+        JointState(name=list(JOINTS), position=[0.1, 3.0, 0.1, 3.0], velocity=[1.0]),
     ):
         message.header.stamp = stamp_of(10**13)
         walk.joints.publish(message)
@@ -229,14 +230,37 @@ def test_links_can_be_left_to_robot_state_publisher(start, graph):
     assert_left_cleanly(node, node.stop())
 
 
-def test_a_frame_with_a_slash_and_an_unknown_walker_stop_the_start(start):
-    for parameters, text in (
-        ({"fixed_frame": "/odom"}, "fixed_frame"),
-        ({"walker_file": "no.yaml"}, "no.yaml"),
-    ):
-        node = start(NODE, **parameters)
-        assert node.process.wait(60) == 1
-        assert text in node.output()
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("fixed_frame", "/odom", "fixed_frame"),
+        ("walker_file", "no.yaml", "no.yaml"),
+        ("gait", "bad name", "'bad name' is no name of a topic"),
+        ("joint_reference", "a//b", "'a//b' is no name of a topic"),
+    ],
+)
+def test_a_parameter_that_cannot_be_followed_stops_the_start(start, name, value, text):
+    node = start(NODE, **{name: value})
+    assert node.process.wait(60) == 1
+    assert text in node.output()
+    assert "Traceback" not in node.output()
+
+
+def test_one_picture_a_second_loses_no_step_of_a_fast_walk(start, graph):
+    start(NODE, rate=1.0)
+    walk = Walk(graph, gait=packaged_gait(1.087))
+    assert 2 * walk.profile.step_time < 1.0, "its cycle is shorter than the time from picture to picture"
+    walk.announce()
+    ways = []
+    for second in np.arange(0.0, 10.5, 1.05):
+        # References without velocities are shown too.
+        walk.send(second, fields=("position", "effort"))
+        base = walk.picture()[0]["base_link"]
+        _, way = walk.references[nanoseconds_of(base.header.stamp)]
+        ways.append(base.transform.translation.x - way)
+        for between in np.arange(0.105, 1.0, 0.105):
+            walk.publish(second + between, fields=("position", "effort"))
+    assert np.ptp(ways) < 1e-3
 
 
 def test_names_are_relative_so_that_several_walkers_share_a_graph(shared, graph):

@@ -5,11 +5,12 @@ from hypothesis import strategies as st
 from library.made_up_gait import made_up_gait
 
 from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.library import GaitLibrary
 from walk_optimizer.mechanics import foot_arm
 from walk_optimizer.model.functions import evaluate
-from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
-from walk_optimizer.profile import EulerProfile
+from walk_optimizer.profile import EulerProfile, profile_of
 from walk_optimizer.reference_check import CycleMatcher
 from walk_optimizer.references import EXCHANGED_JOINTS, JOINTS, cycle_reference, sample_cycle
 
@@ -104,3 +105,28 @@ def test_a_received_reference_is_found_in_the_cycle(place):
     assert max(match.position, match.velocity, match.effort) < 1e-6
     wrong = matcher.match(true.position + 0.01, true.velocity, true.effort)
     assert wrong.position > 1e-3
+
+
+@pytest.fixture(scope="module")
+def shipped(tmp_path_factory):
+    return GaitLibrary(WalkerParameters.from_yaml(), tmp_path_factory.mktemp("empty")).gaits()
+
+
+@pytest.mark.parametrize("mode", list(SpringMode))
+def test_no_reference_of_a_shipped_gait_is_taken_for_a_mirrored_one(shipped, mode):
+    gaits = [gait for gait in shipped if gait.request.spring_mode is mode]
+    assert len(gaits) == 7
+    for gait in gaits:
+        profile = profile_of(gait)
+        matcher = CycleMatcher(profile)
+        cycle = sample_cycle(profile, 2000.0)
+        # Where the legs pass each other, the mirrored posture is nearest: once a step.
+        apart = np.abs(cycle.position[:2] - cycle.position[2:]).max(axis=0)
+        passing = cycle.time[np.argmin(apart)] % profile.step_time
+        close = passing + np.linspace(-0.02, 0.02, 80)
+        exchanges = profile.step_time * np.arange(3)
+        whole = np.linspace(0.0, matcher.period, 120)
+        for time in np.concatenate([whole, exchanges, close, close + profile.step_time]):
+            true = cycle_reference(profile, float(time))
+            match = matcher.match(true.position, true.velocity, true.effort)
+            assert max(match.position, match.velocity, match.effort) < 1e-5, (gait.speed, time)

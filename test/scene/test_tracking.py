@@ -11,9 +11,9 @@ from walk_optimizer.mechanics import foot_arm
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.references import cycle_reference
-from walk_optimizer.scene.gait import ShownGait
+from walk_optimizer.scene.gait import Place, ShownGait
 from walk_optimizer.scene.paths import Trail, paths_ahead
-from walk_optimizer.scene.tracking import WalkTracker
+from walk_optimizer.scene.tracking import GAIT_TOLERANCE, WalkTracker
 
 WALKER = WalkerParameters()
 SPEED, MODE = 0.32, "stiffness_and_equilibrium"
@@ -49,6 +49,119 @@ def test_the_base_is_the_walks_over_ten_steps_at_any_rate(solved, rate):
         offsets.append(pose.base - base)
     # The tracker begins where it is told nothing of, and does not drift from there.
     assert np.ptp(offsets, axis=0).max() < 1e-4
+
+
+@pytest.fixture(scope="module")
+def shipped(tmp_path_factory):
+    """The gaits that ship, as displays show them."""
+    library = GaitLibrary(WalkerParameters.from_yaml(), tmp_path_factory.mktemp("empty"))
+    return [ShownGait(gait) for gait in library.gaits()]
+
+
+def place_at(shown, time):
+    """The place at a time in [s] of an endless walk."""
+    step, rest = divmod(time, shown.profile.step_time)
+    return Place(rest, int(step) % 2, 0.0)
+
+
+# What is known besides positions: the scale of the velocity, and how many cycles ago the place before was.
+KNOWLEDGE = {
+    "velocity": (1.0, None),
+    "velocity on the way to a pause": (1e-3, None),
+    "place before": (None, 0.2),
+    "place before in a pause": (0.0, 0.0),
+    "velocity after lost references": (1.0, 0.5),
+}
+
+
+@pytest.mark.parametrize(("scale", "ago"), KNOWLEDGE.values(), ids=list(KNOWLEDGE))
+def test_no_place_of_a_shipped_gait_is_taken_for_the_mirrored_one(shipped, scale, ago):
+    assert len(shipped) == 21
+    for shown in shipped:
+        cycle = 2 * shown.profile.step_time
+        for time in np.linspace(0.0, cycle, 1001)[:-1].tolist():
+            reference = cycle_reference(shown.profile, time)
+            velocity = None if scale is None else scale * reference.velocity
+            before = None if ago is None else place_at(shown, time - ago * cycle)
+            found = shown.locate(reference.position, velocity, before)
+            late = found.time + found.stance * shown.profile.step_time - time
+            assert (late + 0.1) % cycle == pytest.approx(0.1, abs=3e-4), (shown.profile.step_time, time)
+            assert found.deviation < GAIT_TOLERANCE / 20
+
+
+@pytest.mark.parametrize("told", [True, False], ids=["velocities", "positions alone"])
+@pytest.mark.parametrize("speed", [1.92, 2.44, 3.913], ids="{} km/h".format)
+def test_for_minutes_no_stride_is_made_up_where_the_legs_pass_each_other(speed, told):
+    gait, _ = GaitLibrary(WALKER).find(speed / 3.6, "stiffness", "nearest")
+    shown, tracker = ShownGait(gait), WalkTracker(WALKER)
+    tracker.follow(shown)
+    # Pictures fall anywhere in an interval of the stream: no place of the cycle is left out.
+    late = np.random.default_rng(1).uniform(0.0, 2e-3, 5400)
+    offsets = []
+    for time in np.arange(5400) / 30.0 + late:
+        ((reference, base),) = walk(shown.profile, 1.0, 0.5, begin=time)
+        offsets.append(tracker.take(reference.position, reference.velocity if told else None).base - base)
+    assert np.ptp(offsets, axis=0).max() < 1e-3
+
+
+def test_a_pause_where_the_legs_pass_each_other_moves_nothing():
+    gait, _ = GaitLibrary(WALKER).find(2.44 / 3.6, "stiffness", "nearest")
+    shown = ShownGait(gait)
+    references = [one for one, _ in walk(shown.profile, 2000.0, shown.profile.step_time)]
+    mirrored = [np.abs(one.position[:2] - one.position[2:]).max() for one in references]
+    passing = references[int(np.argmin(mirrored))].time
+    for pause in passing + np.linspace(-0.01, 0.01, 41):
+        tracker = WalkTracker(WALKER)
+        tracker.follow(shown)
+        offsets = []
+        # The walk slows down to a hold, and runs again.
+        for ahead in (-0.05, -0.02, -0.001, 0.0, 0.0, 0.0, 0.001, 0.02, 0.05):
+            ((reference, base),) = walk(shown.profile, 1.0, 0.5, begin=pause + ahead)
+            offsets.append(tracker.take(reference.position, abs(ahead) * reference.velocity).base - base)
+        assert np.ptp(offsets, axis=0).max() < 1e-3
+
+
+def test_noise_at_the_exchange_of_the_legs_makes_no_stride_up(solved):
+    _, shown = solved
+    tracker = WalkTracker(WALKER)
+    tracker.follow(shown)
+    bases = []
+    for time in shown.profile.step_time * np.array([0.9, 1.0, 1.0 - 1e-4, 1.0 + 1e-4, 1.0 - 1e-4, 1.0]):
+        reference = cycle_reference(shown.profile, float(time))
+        bases.append(tracker.take(reference.position).base - reference.base)
+    assert np.ptp(bases, axis=0).max() < 1e-3
+
+
+@pytest.mark.parametrize("rate", [1.0, 1.08, 1.2, 2.0])
+def test_few_pictures_a_second_lose_no_step_of_the_fastest_gait(shipped, rate):
+    shown = min(shipped, key=lambda one: one.profile.step_time)
+    tracker = WalkTracker(WALKER)
+    tracker.follow(shown)
+    offsets, looks, last, pictured = [], 0, -np.inf, -np.inf
+    for number, (reference, base) in enumerate(walk(shown.profile, 500.0, 10.0)):
+        due = number / 500.0 - pictured >= 1 / rate
+        if due or number / 500.0 - last >= tracker.patience:
+            pose = tracker.take(reference.position, reference.velocity)
+            last, looks = number / 500.0, looks + 1
+        if due:
+            pictured = last
+            offsets.append(pose.base - base)
+    assert np.ptp(offsets, axis=0).max() < 1e-3
+    assert looks < 10 * 4 / (2 * shown.profile.step_time) + len(offsets) + 1, "no more than is needed"
+
+
+def test_nothing_may_be_left_out_while_no_gait_tells_where_the_references_lead(solved):
+    _, shown = solved
+    tracker = WalkTracker(WALKER)
+    reference = cycle_reference(shown.profile, 0.1)
+    tracker.take(reference.position)
+    assert tracker.patience == 0.0
+    tracker.follow(shown)
+    assert tracker.patience == 0.0
+    tracker.take(reference.position)
+    assert 0.0 < tracker.patience <= shown.profile.step_time / 2
+    tracker.take(reference.position + 0.1)
+    assert tracker.patience == 0.0
 
 
 def test_the_standing_foot_stands_and_a_foot_lands_a_step_ahead(solved):

@@ -34,7 +34,12 @@ def test_a_fall_is_told_with_its_step_and_reason(tmp_path):
         ("--push", "1e308", "push is '1e308', allowed are finite numbers above -10000 up to 10000, in N s"),
         ("--heavier", "-100", "heavier is '-100', allowed are finite numbers above -100 up to 1000, in %"),
         ("--heavier", "1e308", "heavier is '1e308', allowed are finite numbers above -100 up to 1000, in %"),
-        ("--friction", "0", "friction is '0', allowed are finite numbers above 0, without unit"),
+        ("--friction", "0", "friction is '0', allowed are finite numbers above 0 up to 10, without unit"),
+        (
+            "--friction",
+            "1e308",
+            "friction is '1e308', allowed are finite numbers above 0 up to 10, without unit",
+        ),
     ],
 )
 def test_impossible_numbers_are_refused(option, value, named, tmp_path):

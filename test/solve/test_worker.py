@@ -154,6 +154,37 @@ def test_a_process_that_cannot_be_started_is_an_answer_and_the_next_job_is_done(
     assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
 
 
+def test_a_first_process_that_cannot_be_started_is_an_answer_and_the_next_job_is_done(monkeypatch):
+    tried = threading.Event()
+
+    def no_process(_function):
+        tried.set()
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(worker_module, "WorkerHandle", no_process)
+        pool = WorkerPool(work)
+        assert tried.wait(PATIENCE)
+        assert pool.state() == PoolState(workers=0, running=0, waiting=0)
+        error = pool.submit("echo lost", FOREVER).future.exception(PATIENCE)
+    try:
+        assert isinstance(error, SolveFailedError)
+        assert str(error) == "no process for the solve: Too many open files"
+        assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
+    finally:
+        pool.close()
+
+
+def test_a_pool_that_never_had_a_process_is_closed(monkeypatch):
+    def no_process(_function):
+        raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+    monkeypatch.setattr(worker_module, "WorkerHandle", no_process)
+    pool = WorkerPool(work)
+    pool.close()
+    assert not any(thread.name.startswith("solve_worker") for thread in threading.enumerate())
+
+
 def test_a_worker_that_exits_by_itself_is_lost(pool):
     assert status_of(pool.submit("die", FOREVER)) is Status.WORKER_LOST
 

@@ -25,6 +25,8 @@ _MOST_STEPS = 1000
 # Far beyond what any feedback holds: where forces or masses overflow, the integrator never ends a step.
 _LARGEST_PUSH = 1e4  # [N s]
 _MOST_HEAVIER = 1e3  # [%]
+# No ground holds a foot so well.
+_MOST_FRICTION = 10.0  # [-]
 # What says how a whole table is walked; all else is about one gait.
 _OF_TABLES = frozenset({"table", "walker", "library", "friction", "run"})
 
@@ -182,4 +184,6 @@ def _amount(
 def _friction(args: argparse.Namespace) -> float | None:
     """Return the friction coefficient of the ground; None for that of the gait's walker."""
     text = args.friction
-    return None if text is None else parse_number(text, "friction", "without unit", above=0.0)
+    if text is None:
+        return None
+    return parse_number(text, "friction", "without unit", above=0.0, most=_MOST_FRICTION)

@@ -10,6 +10,8 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
+from walk_optimizer.errors import ConfigurationError
+from walk_optimizer.nodes.paths import named_path
 from walk_optimizer.nodes.qos_warnings import warn_of_subscribers
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.recording import Recorder, RecorderSettings, TopicInfo
@@ -42,9 +44,9 @@ def named_folder(name: str) -> Path:
         BagNotWritableError: there is no such home.
     """
     try:
-        return Path(name).expanduser().absolute()
-    except RuntimeError as error:
-        raise BagNotWritableError(f"Cannot write {name}: no such home; name another folder") from error
+        return named_path(name).absolute()
+    except ConfigurationError as error:
+        raise BagNotWritableError(f"Cannot write {error}") from error
 
 
 def record(recorder: Recorder, topic: str, data: bytes, time_ns: int) -> None:

@@ -2,7 +2,6 @@
 
 import sys
 from collections import Counter
-from pathlib import Path
 
 from walk_optimizer_interfaces.msg import GaitTable
 from walk_optimizer_interfaces.srv import GetGait, ListGaits, OptimizeGait, Rebuild
@@ -23,6 +22,7 @@ from walk_optimizer.nodes.diagnostics import Finding, Level
 from walk_optimizer.nodes.lifecycle import ManagedNode
 from walk_optimizer.nodes.log_text import with_fields
 from walk_optimizer.nodes.parameters import Setting, require_name
+from walk_optimizer.nodes.paths import named_path
 from walk_optimizer.nodes.qos import LATCHED
 from walk_optimizer.nodes.running import run_node
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
@@ -77,11 +77,12 @@ class GaitLibraryNode(ManagedNode):
         """Load the library and offer it.
 
         Raises:
+            ConfigurationError: the walker's file can't be used, or the cache folder is in no home.
             GaitFileError: the cache folder is missing, a symbolic link or not writable.
         """
         folder = self.parameters["cache_folder"]
         walker = walker_of(self.parameters["walker_file"])
-        self._library = GaitLibrary(walker, Path(folder) if folder else None, writable=True)
+        self._library = GaitLibrary(walker, named_path(folder) if folder else None, writable=True)
         for problem in self._library.problems():
             self.get_logger().warning(f"gait file set aside: {problem}")
         self._blends.forget()

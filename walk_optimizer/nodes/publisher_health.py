@@ -70,7 +70,7 @@ class PublisherHealth:
     def _timing(self) -> Finding:
         punctuality = self._stream.punctuality()
         if punctuality is None:
-            return Finding(Level.OK, "nothing is streamed yet")
+            return Finding(Level.OK, "nothing is streamed")
         values: dict[str, object] = {"rate": punctuality.rate}
         for name, three in (("lateness", punctuality.lateness), ("jitter", punctuality.jitter)):
             for kind, value in zip(("median", "99_percent", "max"), three, strict=True):

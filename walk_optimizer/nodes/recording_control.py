@@ -47,7 +47,8 @@ class RecordingControl:
 
     Owns the thread that waits for the disk meanwhile: the executor never does, for it also has to carry out
     an emergency stop. The parameter tells what is: it goes back to false when a bag can't be begun or ends by
-    itself.
+    itself. A deactivation closes the bag; only one that the parameter has asked for is followed by another as
+    soon as the node is active again.
     """
 
     def __init__(self, node: ManagedNode, bag: StreamBag, stream: JointStream) -> None:
@@ -61,6 +62,8 @@ class RecordingControl:
         self._node, self._bag, self._stream = node, bag, stream
         self._foreign: ForeignTopics | None = None
         self._showing = False
+        # Whether the parameter is true for a bag of the service, and nobody has set it.
+        self._only_shown = False
         self._thread = ThreadPoolExecutor(1, "bags")
         self._log = _NodeLog(node, self._show)
         commands = {str(node.resolve_topic_name(name)) for name in _COMMANDS}
@@ -73,6 +76,7 @@ class RecordingControl:
     def follow_parameter(self, wanted: bool) -> None:
         """Record, or don't, as the parameter `record` says; it is begun, and nothing is waited for."""
         if not self._showing:
+            self._only_shown = False
             self._node.later(self._follow, wanted)
 
     def close(self) -> None:
@@ -81,6 +85,9 @@ class RecordingControl:
         with contextlib.suppress(NotRecordingError):
             self._tell_closed(self._thread.submit(self._bag.stop).result())
         self._listen_to_others()
+        # Otherwise an activation would take it for a wish.
+        if self._only_shown:
+            self._show()
 
     def end(self) -> None:
         """Close the bag and end the thread."""
@@ -166,7 +173,7 @@ class RecordingControl:
         running = self._bag.recording
         if self._node.parameters["record"] == running:
             return
-        self._showing = True
+        self._only_shown, self._showing = running, True
         try:
             self._node.set_parameters([Parameter("record", value=running)])
         finally:

@@ -1,7 +1,6 @@
 """Plans the steps between paces in a process of its own: they may take long, and the stream never waits."""
 
 from collections import OrderedDict
-from pathlib import Path
 from typing import TypeAlias
 
 from walk_optimizer.blending import blended
@@ -10,6 +9,7 @@ from walk_optimizer.gait import RefinedGait
 from walk_optimizer.gait_files.access import writable_folder
 from walk_optimizer.joint_limits import peaks_of, peaks_of_solved
 from walk_optimizer.model.parameters import KneeSpring
+from walk_optimizer.nodes.paths import named_path
 from walk_optimizer.nodes.publisher_settings import BLENDED
 from walk_optimizer.nodes.streamed_gait import Goal, Way, pace_of_goal, profile_of_goal
 from walk_optimizer.nodes.suite_node import SuiteNode
@@ -49,12 +49,14 @@ class TransitionPlanner:
             node: Whose parameters count, and whose executor waits.
 
         Raises:
+            ConfigurationError: the walker's file can't be used, or the cache folder is in no home.
             GaitFileError: the cache folder is missing, a symbolic link or not writable.
         """
         self._node = node
         named = node.parameters["cache_folder"]
         walker = walker_of(node.parameters["walker_file"])
-        writable_folder(Path(named) if named else cache_folder(walker), create=not named)
+        self._folder = named_path(named) if named else None
+        writable_folder(self._folder or cache_folder(walker), create=self._folder is None)
         self._known: OrderedDict[_Ends, tuple[RefinedGait, ...]] = OrderedDict()
         self._pool: WorkerPool | None = None
         self._ticket: Ticket | None = None
@@ -120,13 +122,13 @@ class TransitionPlanner:
         self, begins: Goal, leads_to: Goal, torque_limit: TorqueLimit
     ) -> tuple[RefinedGait, ...]:
         source, target = _paces(begins, leads_to)
-        folder, limit = self._node.parameters["cache_folder"], self._node.parameters["transition_time_limit"]
+        limit = self._node.parameters["transition_time_limit"]
         job = TransitionJob(
             source=source,
             target=target,
             torque_limit=torque_limit,
             time_limit=limit,
-            folder=Path(folder) if folder else None,
+            folder=self._folder,
         )
         if self._pool is None:
             self._pool = WorkerPool(transition_job, _WORKERS)

@@ -1,9 +1,8 @@
 """The parameter that says which walker a node is for."""
 
-from pathlib import Path
-
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.parameters import Setting
+from walk_optimizer.nodes.paths import named_path
 
 
 def walker_of(path: str) -> WalkerParameters:
@@ -12,7 +11,7 @@ def walker_of(path: str) -> WalkerParameters:
     Raises:
         ConfigurationError: the file can't be read, or has an impossible entry.
     """
-    return WalkerParameters.from_yaml(Path(path) if path else None)
+    return WalkerParameters.from_yaml(named_path(path) if path else None)
 
 
 WALKER_FILE = Setting(

@@ -18,7 +18,7 @@ from walk_optimizer.description.skeleton import skeleton_of
 from walk_optimizer.description.transforms import base_transform, link_transforms
 from walk_optimizer.description.urdf import walker_urdf
 from walk_optimizer.errors import ConfigurationError, WalkOptimizerError
-from walk_optimizer.nodes.parameters import Setting, require_frame
+from walk_optimizer.nodes.parameters import Setting, require_frame, require_name
 from walk_optimizer.nodes.qos import LATCHED, STREAM
 from walk_optimizer.nodes.running import run_node
 from walk_optimizer.nodes.scene_markers import SceneMarkers
@@ -41,9 +41,16 @@ SETTINGS = [
         "joint_reference",
         "reference_publisher/joint_reference",
         "Topic of the joint references.",
+        check=require_name,
         read_only=True,
     ),
-    Setting("gait", "reference_publisher/gait", "Topic of the gait that is walked.", read_only=True),
+    Setting(
+        "gait",
+        "reference_publisher/gait",
+        "Topic of the gait that is walked.",
+        check=require_name,
+        read_only=True,
+    ),
     Setting("rate", 30.0, "Pictures per second [Hz].", 1.0, 100.0),
     Setting(
         "fixed_frame",
@@ -80,7 +87,7 @@ class WalkerVisualizerNode(SuiteNode):
         )
         self._drawing = SceneMarkers(self.parameters["fixed_frame"], settings.leg_spacing)
         self._shown_ns: int | None = None
-        self._in_gait = False
+        self._moved_ns = 0
         self._description = self.create_publisher(String, "robot_description", LATCHED)
         self._transforms = self.create_publisher(TFMessage, "tf", STREAM)
         self._markers = self.create_publisher(MarkerArray, "~/markers", STREAM)
@@ -112,19 +119,22 @@ class WalkerVisualizerNode(SuiteNode):
         self._scene.follow(gait)
 
     def _take_reference(self, message: JointState) -> None:
-        due = self._is_due(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec)
-        # A gait tells where it leads; all else has to be followed from each reference to the next.
-        if not due and self._in_gait:
+        stamp_ns = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        due = self._is_due(stamp_ns)
+        if not due and stamp_ns - self._moved_ns < self._scene.patience * 1e9:
             return
         try:
             position = joint_values(message, "position")
-            effort = joint_values(message, "effort") if message.effort else None
+            velocity, effort = (
+                joint_values(message, field) if getattr(message, field) else None
+                for field in ("velocity", "effort")
+            )
         except WalkOptimizerError as error:
             self.get_logger().warning(f"reference not shown: {error}", throttle_duration_sec=1.0)
             return
-        pose = self._scene.move(position)
+        pose = self._scene.move(position, velocity)
+        self._moved_ns = stamp_ns
         self._health.note(pose)
-        self._in_gait = pose.place is not None
         if due:
             self._show(message, pose, effort)
 

@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 from walk_optimizer.gait import Gait
 from walk_optimizer.mechanics import foot_arm, horizontal_and_vertical
 from walk_optimizer.profile import RefinedProfile, StepProfile, profile_of
-from walk_optimizer.references import sample_cycle
+from walk_optimizer.reference_check import CycleSearch
 
 FloatArray = NDArray[np.float64]
 
-# The cycle is tabulated at so many places and straight between two of them.
-_TABLE_POINTS = 1600
 # Points of a foot's path over a step.
 _PATH_POINTS = 60
 
@@ -38,7 +36,7 @@ class ShownGait:
     """A gait, as it is walked."""
 
     def __init__(self, gait: Gait) -> None:
-        """Tabulate the cycle.
+        """Prepare the search in its cycle.
 
         Args:
             gait: Its refined part is shown if that is certified.
@@ -48,28 +46,23 @@ class ShownGait:
         """
         self.profile: StepProfile = profile_of(gait)
         self._gait = gait
-        self._cycle = sample_cycle(self.profile, _TABLE_POINTS / (2 * self.profile.step_time))
+        self._search = CycleSearch(self.profile)
 
-    def locate(self, position: FloatArray) -> Place:
-        """Return the place of the cycle that is nearest to joint positions (4,) in [rad]."""
-        table = self._cycle.position
-        nearest = int(np.argmin(np.sum((table - position[:, None]) ** 2, axis=0)))
-        time, deviation = min(
-            (self._on_chord(start, position) for start in (nearest - 1, nearest)),
-            key=lambda found: found[1],
-        )
-        stance = int(time >= self.profile.step_time)
-        return Place(time - stance * self.profile.step_time, stance, deviation)
+    def locate(
+        self, position: FloatArray, velocity: FloatArray | None = None, before: Place | None = None
+    ) -> Place:
+        """Return the place of the cycle that a reference belongs to.
 
-    def _on_chord(self, start: int, position: FloatArray) -> tuple[float, float]:
-        """Return time and deviation of the nearest place between two entries of the table."""
-        times, table = self._cycle.time, self._cycle.position
-        start = min(max(start, 0), times.size - 2)
-        along = table[:, start + 1] - table[:, start]
-        ahead = float(along @ (position - table[:, start])) / max(float(along @ along), 1e-30)
-        part = min(max(ahead, 0.0), 1.0)
-        deviation = float(np.max(np.abs(table[:, start] + part * along - position)))
-        return float(times[start] + part * (times[start + 1] - times[start])), deviation
+        Args:
+            position: Of the joints in [rad], (4,).
+            velocity: In [rad/s], (4,); None where it is not known.
+            before: Place of the reference before it; None where it is not known.
+        """
+        step_time = self.profile.step_time
+        former = before.time + before.stance * step_time if before is not None else None
+        time, deviation = self._search.nearest(position, velocity, former)
+        stance = int(time >= step_time)
+        return Place(time - stance * step_time, stance, deviation)
 
     @cached_property
     def swing_path(self) -> FloatArray:

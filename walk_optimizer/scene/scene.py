@@ -59,9 +59,19 @@ class WalkScene:
         self._gait = gait
         self._tracker.follow(gait)
 
-    def move(self, position: FloatArray) -> WalkerPose:
-        """Move the joints to (4,) in [rad], and return where that brings the walker."""
-        return self._tracker.take(position)
+    @property
+    def patience(self) -> float:
+        """How long references may be left out before steps are lost count of, in [s]."""
+        return self._tracker.patience
+
+    def move(self, position: FloatArray, velocity: FloatArray | None = None) -> WalkerPose:
+        """Move the joints, and return where that brings the walker.
+
+        Args:
+            position: To these in [rad], (4,).
+            velocity: At these in [rad/s], (4,); None where they are not known.
+        """
+        return self._tracker.take(position, velocity)
 
     def show(self, time: float, pose: WalkerPose, effort: FloatArray | None) -> Scene:
         """Return what there is to show.

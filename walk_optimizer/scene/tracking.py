@@ -65,10 +65,24 @@ class WalkTracker:
         if self._pose is not None:  # Its place is one of the former gait.
             self._pose = replace(self._pose, place=None)
 
-    def take(self, position: FloatArray) -> WalkerPose:
-        """Return where the walker is when its joints are at (4,) in [rad]."""
+    @property
+    def patience(self) -> float:
+        """How long references may be left out before steps are lost count of, in [s]."""
+        # A gait tells where it leads; all else has to be followed from each reference to the next.
+        if self._gait is None or self._pose is None or self._pose.place is None:
+            return 0.0
+        # Far less than the cycle in which every place comes again.
+        return self._gait.profile.step_time / 2
+
+    def take(self, position: FloatArray, velocity: FloatArray | None = None) -> WalkerPose:
+        """Return where the walker is.
+
+        Args:
+            position: Of its joints in [rad], (4,).
+            velocity: In [rad/s], (4,); None where it is not known.
+        """
         reach = self._reach(position)
-        place = self._place(position)
+        place = self._place(position, velocity)
         stance = place.stance if place is not None else self._standing(reach)
         self._stand_on(stance, place, reach)
         base = self._foot - reach[stance]
@@ -80,10 +94,11 @@ class WalkTracker:
         q = np.concatenate([np.zeros(2), position])[:, None]
         return np.stack([foot_arm(self._walker, q, leg).position[:, 0] for leg in range(2)])
 
-    def _place(self, position: FloatArray) -> Place | None:
+    def _place(self, position: FloatArray, velocity: FloatArray | None) -> Place | None:
         if self._gait is None:
             return None
-        place = self._gait.locate(position)
+        before = self._pose.place if self._pose is not None else None
+        place = self._gait.locate(position, velocity, before)
         return place if place.deviation <= GAIT_TOLERANCE else None
 
     def _standing(self, reach: FloatArray) -> int:
@@ -105,15 +120,17 @@ class WalkTracker:
         if before is None:
             return
         if self._gait is not None and place is not None and before.place is not None:
-            self._foot = self._foot + _steps_between(before.place, place) * self._gait.stride
+            steps = _steps_between(before.place, place, self._gait.profile.step_time)
+            self._foot = self._foot + steps * self._gait.stride
         elif stance != before.stance:
             # Both feet are on the ground now, and the one before is still where it was.
             x = self._foot[0] + reach[stance, 0] - reach[before.stance, 0]
             self._foot = np.array([x, ground_height(self._walker, self._gait, x)])
 
 
-def _steps_between(before: Place, after: Place) -> int:
-    """Return how many steps ended between two places less than a cycle apart."""
-    if before.stance != after.stance:
-        return 1
-    return 2 if after.time < before.time - _PHASE_NOISE else 0
+def _steps_between(before: Place, after: Place, step_time: float) -> int:
+    """Return how many steps of a time in [s] ended between two places less than a cycle apart."""
+    shift = (after.stance - before.stance) * step_time + after.time - before.time
+    # Noise may lead back over the exchange of the legs.
+    ahead = (shift + _PHASE_NOISE) % (2 * step_time) - _PHASE_NOISE
+    return round((before.time + ahead - after.time) / step_time)

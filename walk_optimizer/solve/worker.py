@@ -5,6 +5,7 @@ hashable value, handed to a module-level function in the process (`worker_proces
 """
 
 import atexit
+import contextlib
 import threading
 from collections import deque
 from collections.abc import Callable, Hashable
@@ -148,17 +149,32 @@ class WorkerPool:
 
     def _serve(self, index: int) -> None:
         """Body of a thread: one worker process, renewed whenever it is lost."""
-        worker = self._workers[index] = WorkerHandle(self._function)
+        # At once, so that the first job finds it ready; if that fails, it is the job that is told.
+        with contextlib.suppress(OSError):
+            self._living_worker(index)
         while (task := self._next_task()) is not None:
             try:
-                if not worker.alive:
-                    worker.end()
-                    worker = self._workers[index] = WorkerHandle(self._function)
+                worker = self._living_worker(index)
             except OSError as error:
                 self._finish(task, error=SolveFailedError(f"no process for the solve: {error.strerror}"))
-                continue
-            self._do(task, worker)
-        worker.end()
+            else:
+                self._do(task, worker)
+        if index in self._workers:
+            self._workers[index].end()
+
+    def _living_worker(self, index: int) -> WorkerHandle:
+        """Return the process of a thread; a new one where there is none, or it has ended.
+
+        Raises:
+            OSError: it can't be started.
+        """
+        worker = self._workers.get(index)
+        if worker is not None and worker.alive:
+            return worker
+        if worker is not None:
+            worker.end()
+        worker = self._workers[index] = WorkerHandle(self._function)
+        return worker
 
     def _next_task(self) -> Task | None:
         """Wait for a task; None when the pool is closed."""
