@@ -8,6 +8,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from walk_optimizer.comparison import best_of_both
 from walk_optimizer.errors import GaitFileError, GaitNotFoundError, GaitNotWritableError
 from walk_optimizer.gait import Gait
 from walk_optimizer.gait_files import (
@@ -178,7 +179,8 @@ class GaitLibrary:
         """Write a gait into the folder and serve it from now on, even if it can't be written.
 
         Returns:
-            Its file; a former one of the same request is replaced. The packaged table's gait is
+            Its file; a former one of the same request is replaced, but no refinement is lost: a gait without
+            one is stored with the former's, and as far as it is better. The packaged table's gait is
             still served when its F is smaller, or it alone is refined.
 
         Raises:
@@ -192,6 +194,9 @@ class GaitLibrary:
         if gait.walker != self.walker:
             raise GaitFileError("the gait is for another walker than the library")
         path = self.folder / gait_file_name(gait)
+        former = next((entry.gait for entry in self._found if entry.path == path), None)
+        if former is not None and former.refined is not None and gait.refined is None:
+            gait = best_of_both(former, gait)
         try:
             writable_folder(self.folder, self._create)
             write_gait_file(gait, path)

@@ -15,6 +15,8 @@ from walk_optimizer.resources import as_float, config_file, require_positive, se
 KMH_PER_MS = 3.6
 # The report prints km/h with two decimals: a speed within one unit of the last one names a table gait.
 TABLE_SPEED_TOLERANCE = 0.01 / KMH_PER_MS
+# Relative; far more than speeds are rounded by, and nothing that could be measured.
+_ROUNDING = 1e-12
 _BYTES_PER_POINT = 40_000
 # The impact of the landing takes the first two points of a step.
 _FEWEST_POINTS = 3
@@ -180,7 +182,8 @@ def speed_number(speed: Any) -> float:
 def _checked_speed(given: float, settings: GaitTableSettings) -> float:
     """Return the speed; raise InvalidRequestError outside the settings' range."""
     speed, low, high = speed_number(given), settings.minimum_speed, settings.maximum_speed
-    if not low <= speed <= high:
+    # A speed at an end is rounded when it has become a step, and is asked for again.
+    if not low * (1 - _ROUNDING) <= speed <= high * (1 + _ROUNDING):
         raise InvalidRequestError(
             f"speed is {speed:.8g} m/s, allowed is {low:g} to {high:g} m/s "
             f"({low * KMH_PER_MS:.2f} to {high * KMH_PER_MS:.2f} km/h)"

@@ -31,9 +31,9 @@ def worse(gait):
     return replace(gait, trajectory=trajectory, certificate=certificate)
 
 
-def worse_refinement(gait):
-    """Return a refinement that is certified but takes more torque, by as much as the certificate allows."""
-    trajectory = replace(gait.refined.trajectory, torques=gait.refined.trajectory.torques * (1 + 1e-5))
+def worse_refinement(gait, torque=1e-5):
+    """Return a refinement that is certified but takes more torque, by a part that the certificate allows."""
+    trajectory = replace(gait.refined.trajectory, torques=gait.refined.trajectory.torques * (1 + torque))
     refined = replace(gait.refined, trajectory=trajectory)
     certificate = certify_refined(gait.walker, gait.request, refined)
     assert certificate.certified
@@ -102,6 +102,14 @@ def test_a_better_gait_that_is_not_refined_keeps_the_refinement_that_is_there(tm
 def test_a_worse_refinement_does_not_replace_a_better_one(tmp_path, solved):
     assert store_better(solved, tmp_path)
     assert not store_better(replace(solved, refined=worse_refinement(solved)), tmp_path)
+
+
+def test_a_refinement_that_is_only_better_by_what_meshes_do_is_not_stored(tmp_path, solved):
+    # The effort grows with the square of the torques: it is better by a part of 1e-7.
+    former = replace(solved, refined=worse_refinement(solved, 5e-8))
+    assert solved.refined.trajectory.torque_effort < former.refined.trajectory.torque_effort
+    assert store_better(former, tmp_path)
+    assert not store_better(solved, tmp_path)
 
 
 def test_a_better_refinement_is_written_beside_a_better_gait(tmp_path, solved):

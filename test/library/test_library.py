@@ -142,6 +142,17 @@ def test_a_gait_that_is_not_refined_hides_none_that_is(table, folder):
     assert library.find(FAST, "none")[1] is Source.CACHE
 
 
+def test_a_refinement_is_not_lost_to_a_gait_without_one(table, folder):
+    library = GaitLibrary(WALKER, folder)
+    refined = with_refinement(made_up_gait(torque=2.0))
+    library.store(refined)
+    for torque in (3.0, 1.0):
+        library.store(made_up_gait(torque=torque))
+        gait = GaitLibrary(WALKER, folder).find(FAST, "none")[0]
+        assert gait.objective == pytest.approx(made_up_gait(torque=min(torque, 2.0)).objective)
+        np.testing.assert_array_equal(gait.refined.trajectory.torques, refined.refined.trajectory.torques)
+
+
 def test_summaries_relate_the_modes_of_a_speed(table, folder):
     put(table, torque=2.0)
     put(table, mode="stiffness", torque=1.0)

@@ -3,12 +3,14 @@
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 pytest.importorskip("rclpy")
 
 from nodes.silent_node import FOREVER, Silent
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from walk_optimizer.errors import WalkOptimizerError
@@ -112,3 +114,14 @@ def test_a_call_ends_when_its_node_is_killed_also_if_another_is_there_at_once(gr
     error = graph.result(call.task)
     assert isinstance(error, ServiceUnavailableError)
     assert "went away; ask again" in str(error)
+
+
+def test_a_death_counts_once_whatever_tells_of_it_first(asking):
+    service = asking.connect(Trigger, "/silent/ask")
+    lapse = SimpleNamespace(alive_count=0, alive_count_change=-1, not_alive_count_change=1)
+    service._on_start(String(data="first"))
+    service._on_liveliness(lapse)
+    service._on_start(String(data="second"))
+    assert service.losses == 1
+    service._on_start(String(data="third"))
+    assert service.losses == 2

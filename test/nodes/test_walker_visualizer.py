@@ -1,5 +1,7 @@
 """What the visualizer publishes is the walk: an independent library finds the feet where the gait is."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -23,6 +25,7 @@ from walk_optimizer.description.skeleton import FEET
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.conversions import gait_to_message
 from walk_optimizer.nodes.qos import LATCHED
+from walk_optimizer.nodes.walker_visualizer import _velocity_of
 from walk_optimizer.recording.definitions import type_hash
 from walk_optimizer.references import JOINTS
 
@@ -179,12 +182,17 @@ def test_joints_are_matched_by_name_and_a_message_without_them_is_refused(walk):
         JointState(name=["left_hip"], position=[0.1]),
         JointState(name=list(JOINTS), position=[0.1, float("nan"), 0.1, 3.0]),
         JointState(name=list(JOINTS), position=[]),
-        JointState(name=list(JOINTS), position=[0.1, 3.0, 0.1, 3.0], velocity=[1.0]),
     ):
         message.header.stamp = stamp_of(10**13)
         walk.joints.publish(message)
     walk.graph.spin_for(0.5)
     assert walk.send(0.6) is not straight
+
+
+@pytest.mark.parametrize("velocity", [[], [1.0], [math.nan] * 4])
+def test_velocities_that_are_none_hide_no_walker(velocity):
+    message = JointState(name=list(JOINTS), position=[0.1, 3.0, 0.1, 3.0], velocity=velocity)
+    assert _velocity_of(message) is None
 
 
 def test_a_gait_that_is_none_is_refused_and_the_former_one_stays(walk):

@@ -113,7 +113,11 @@ def test_what_is_allowed_is_accepted():
     assert request.interval == pytest.approx(0.0375)
     assert GaitRequest.for_speed(0.4).points == SETTINGS.points == 200
     for speed in (SETTINGS.minimum_speed, SETTINGS.maximum_speed):
-        assert GaitRequest.for_speed(speed).speed == pytest.approx(speed)
+        request = GaitRequest.for_speed(speed)
+        assert request.speed == pytest.approx(speed)
+        # It is asked for again, by neighbours, files and messages.
+        assert GaitRequest.for_step(request.step_length, request.step_time) == request
+        assert GaitRequest.for_speed(request.speed).speed == pytest.approx(speed)
 
 
 @given(st.floats(0.15, 1.2))

@@ -52,10 +52,17 @@ def test_an_interrupted_build_drops_its_queue(pool):
 def test_a_build_begins_with_the_refinements_of_the_former_table():
     walker = WalkerParameters.from_yaml()
     former = GaitLibrary(walker).find(0.32, "none", "nearest")[0]
-    builder = table_builder._Builder(walker, {KEY: former.request}, [former], None, None)
-    builder.table = {KEY: replace(former, refined=None)}
-    builder._recall_refinements()
-    assert builder.table[KEY].refined is former.refined
+    bare = replace(former, refined=None)
+
+    def submit(run, _):
+        """Find the former gait again, and no refinement of it."""
+        future = Future()
+        future.set_result(Outcome(bare if run is table_builder._run else None, former.report))
+        return future
+
+    pool = SimpleNamespace(submit=submit)
+    builder = table_builder._Builder(walker, {KEY: former.request}, [former], pool, None)
+    assert builder.build()[KEY].refined is former.refined
 
 
 def test_refinements_are_continued_until_none_improves(monkeypatch):

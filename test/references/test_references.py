@@ -11,7 +11,7 @@ from walk_optimizer.model.functions import evaluate
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.profile import EulerProfile, profile_of
-from walk_optimizer.reference_check import CycleMatcher
+from walk_optimizer.reference_check import CycleMatcher, CycleSearch
 from walk_optimizer.references import EXCHANGED_JOINTS, JOINTS, cycle_reference, sample_cycle
 
 SLOW = EulerProfile.of(made_up_gait(points=20))
@@ -110,6 +110,14 @@ def test_a_received_reference_is_found_in_the_cycle(place):
 @pytest.fixture(scope="module")
 def shipped(tmp_path_factory):
     return GaitLibrary(WalkerParameters.from_yaml(), tmp_path_factory.mktemp("empty")).gaits()
+
+
+def test_the_exchange_of_the_legs_is_the_middle_entry_of_the_table(shipped):
+    # A chord across it would cut the corner where the velocity jumps.
+    for profile in (SLOW, FAST, *map(profile_of, shipped)):
+        times = CycleSearch(profile)._times
+        assert times.size == 1601
+        assert times[800] == pytest.approx(profile.step_time, abs=1e-12)
 
 
 @pytest.mark.parametrize("mode", list(SpringMode))

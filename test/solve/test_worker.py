@@ -84,6 +84,16 @@ def test_cancel_answers_at_once_and_ends_the_process(pool):
     assert pool.submit("echo next", FOREVER).future.result(PATIENCE) == "next"
 
 
+def test_a_process_that_is_still_starting_outlives_a_job_that_is_given_up(pool):
+    ticket = pool.submit("pid", FOREVER)
+    deadline = time.monotonic() + PATIENCE
+    while ticket.progress.stage == "queued":
+        assert time.monotonic() < deadline
+    (worker,) = pool._workers.values()
+    ticket.cancel()
+    assert pool.submit("pid", FOREVER).future.result(PATIENCE) == worker._process.pid
+
+
 def test_a_cancelled_report_keeps_the_last_iterate(pool):
     progress = FirstProgress()
     ticket = pool.submit("sleep", FOREVER, progress)

@@ -98,4 +98,5 @@ class RemoteService:
         """Note whether anybody lives; a node without the topic is never heard of, and counts as alive."""
         if change.alive_count_change < 0 or change.not_alive_count_change > 0:
             self.losses += 1
+            self._life = ""  # Its successor's message counts it no second time.
         self._lost = change.alive_count == 0

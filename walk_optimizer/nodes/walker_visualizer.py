@@ -125,14 +125,11 @@ class WalkerVisualizerNode(SuiteNode):
             return
         try:
             position = joint_values(message, "position")
-            velocity, effort = (
-                joint_values(message, field) if getattr(message, field) else None
-                for field in ("velocity", "effort")
-            )
+            effort = joint_values(message, "effort") if message.effort else None
         except WalkOptimizerError as error:
             self.get_logger().warning(f"reference not shown: {error}", throttle_duration_sec=1.0)
             return
-        pose = self._scene.move(position, velocity)
+        pose = self._scene.move(position, _velocity_of(message))
         self._moved_ns = stamp_ns
         self._health.note(pose)
         if due:
@@ -169,6 +166,14 @@ def joint_values(message: JointState, field: str) -> FloatArray:
     if not np.isfinite(values).all():
         raise ConfigurationError(f"a number of {field} is not finite")
     return values
+
+
+def _velocity_of(message: JointState) -> FloatArray | None:
+    """Return the velocities of the walker's joints in [rad/s], (4,); None where they can't help."""
+    try:
+        return joint_values(message, "velocity")
+    except WalkOptimizerError:
+        return None
 
 
 def main() -> int:

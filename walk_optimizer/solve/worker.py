@@ -124,6 +124,8 @@ class WorkerPool:
             self._changed.notify_all()
         for ticket in tickets:
             self._end(ticket, _SHUTTING_DOWN)
+        for worker in tuple(self._workers.values()):
+            worker.kill()
         for thread in self._threads:
             thread.join()
         atexit.unregister(self.close)
@@ -142,9 +144,9 @@ class WorkerPool:
     def _drop(self, task: Task) -> None:
         """Forget a task that nobody waits for."""
         del self._tasks[task.job, task.time_limit]
-        if task.worker is not None:
+        if task.handed_over and task.worker is not None:
             task.worker.kill()
-        elif task in self._queue:  # Otherwise a thread has just taken it, and will see that it is off.
+        elif task in self._queue:  # Otherwise a thread has taken it, and will see that it is off.
             self._queue.remove(task)
 
     def _serve(self, index: int) -> None:
@@ -188,6 +190,9 @@ class WorkerPool:
                 return
             task.start(worker)
         try:
+            worker.wait_until_ready()
+            if not self._hand_over(task):
+                return
             answer = worker.run(task.job, task.time_limit + self._grace, task.tell)
         except WorkerOverdueError:
             self._finish(task, error=task.stopped(Status.TIME_LIMIT))
@@ -195,6 +200,16 @@ class WorkerPool:
             self._finish(task, error=task.stopped(Status.WORKER_LOST))
         else:
             self._answer(task, answer)
+
+    def _hand_over(self, task: Task) -> bool:
+        """Note that the worker gets a job, and return whether anybody still wants it.
+
+        Until then a job that is given up leaves its process alone: jobs that follow each other faster than a
+        process starts would never be done otherwise.
+        """
+        with self._changed:
+            task.handed_over = bool(task.tickets)
+            return task.handed_over
 
     def _answer(self, task: Task, answer: Finished | Failed) -> None:
         if isinstance(answer, Finished):

@@ -66,10 +66,8 @@ class WorkerHandle:
             WorkerLostError: the process ended.
             WorkerOverdueError: the limit is over, and the process killed.
         """
-        try:
-            if not self._ready:
-                self._receive(time.monotonic() + START_LIMIT)
-                self._ready = True
+        self.wait_until_ready()
+        with self._lost_if_broken():
             self._connection.send(job)
             deadline = time.monotonic() + time_limit
             while True:
@@ -78,9 +76,18 @@ class WorkerHandle:
                     return event
                 if isinstance(event, Progress):
                     on_progress(event)
-        except (EOFError, OSError) as error:
-            self.end()
-            raise WorkerLostError from error
+
+    def wait_until_ready(self) -> None:
+        """Wait until the process has imported what it needs.
+
+        Raises:
+            WorkerLostError: the process ended.
+            WorkerOverdueError: it takes too long, and is killed.
+        """
+        if not self._ready:
+            with self._lost_if_broken():
+                self._receive(time.monotonic() + START_LIMIT)
+            self._ready = True
 
     def kill(self) -> None:
         """End the process and whatever it has started, at once."""
@@ -96,6 +103,14 @@ class WorkerHandle:
         self.kill()
         self._process.join()
         self._connection.close()
+
+    @contextlib.contextmanager
+    def _lost_if_broken(self) -> Iterator[None]:
+        try:
+            yield
+        except (EOFError, OSError) as error:
+            self.end()
+            raise WorkerLostError from error
 
     def _receive(self, deadline: float) -> Ready | Progress | Finished | Failed:
         if not self._connection.poll(max(deadline - time.monotonic(), 0.0)):

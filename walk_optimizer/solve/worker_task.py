@@ -54,12 +54,22 @@ class Ticket:
 
 
 class Task:
-    """A job and everyone who waits for it."""
+    """A job and everyone who waits for it.
+
+    Attributes:
+        job: For the function.
+        time_limit: From the start of the job in [s].
+        tickets: Those who wait.
+        worker: That does it, or is to do it as soon as it is ready; None in the queue.
+        handed_over: Whether the worker has got the job.
+        begin: When it was queued, or then started.
+    """
 
     def __init__(self, job: Hashable, time_limit: float) -> None:
         self.job, self.time_limit = job, time_limit
         self.tickets: list[Ticket] = []
         self.worker: WorkerHandle | None = None
+        self.handed_over = False
         self.begin = self._heard = time.monotonic()
         self._progress = _silent("queued")
 
