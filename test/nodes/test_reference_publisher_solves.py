@@ -1,5 +1,7 @@
 """The publisher with real gaits while steps between them are solved for, by its default of `longest_gap`."""
 
+from pathlib import Path
+
 import pytest
 
 pytest.importorskip("rclpy")
@@ -40,8 +42,13 @@ def walker(graph, publisher):
 def ask_for_a_solve(walker, publisher):
     """Return the future answer of a command, once the worker process solves for it."""
     answer = walker.graph.send(SetGait, walker.topic("set_gait"), speed=FASTEST, spring_mode=MODE)
-    walker.graph.spin_until(lambda: workers_of(publisher.process.pid), "the solve")
+    walker.graph.spin_until(lambda: any(map(solves, workers_of(publisher.process.pid))), "the solve")
     return answer
+
+
+def solves(worker):
+    """Whether a worker process has begun to solve: it loads the factorisation for that."""
+    return "multifrontal" in Path(f"/proc/{worker}/maps").read_text()
 
 
 def test_stops_and_emergency_stops_end_the_command_under_way(graph, walker, publisher):

@@ -35,11 +35,12 @@ class Call:
 
     def __init__(self, graph, node, service):
         self._reasons = []
-        self.task = graph.executor.create_task(self._end, node, service)
+        self.service = node.connect(Trigger, service)
+        self.task = graph.executor.create_task(self._end, node)
 
-    async def _end(self, node, service):
+    async def _end(self, node):
         try:
-            return await node.call(node.connect(Trigger, service), Trigger.Request(), FOREVER, self._require)
+            return await node.call(self.service, Trigger.Request(), FOREVER, self._require)
         except WalkOptimizerError as error:
             return error
 
@@ -108,6 +109,7 @@ def test_a_call_ends_when_its_node_is_killed_also_if_another_is_there_at_once(gr
     call = Call(graph, asking, "/silent/ask")
     graph.spin_until(lambda: first.said("asked") or call.task.done(), "the question")
     assert not call.task.done(), call.task.result()
+    graph.spin_until(lambda: call.service._life, "its name")
     graph.spin_for(life)
     first.process.kill()
     start()
