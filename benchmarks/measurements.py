@@ -16,7 +16,7 @@ from plain_transcription import FixedSchedule, PlainSolution, kinematic_points, 
 
 from walk_optimizer.certificate import certify
 from walk_optimizer.gait import Certificate, Gait, RefinedGait, Trajectory
-from walk_optimizer.mechanics import foot_arm
+from walk_optimizer.mechanics import foot_2_ahead
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.optimizer import optimize
 from walk_optimizer.refined_certificate import certify_refined
@@ -103,7 +103,7 @@ def _score_refined(
     spring: KneeSpring,
     status: str,
 ) -> Score:
-    length = float(foot_arm(walker(), trajectory.states[-1, -1][:6, None], 1).position[0, 0])
+    length = foot_2_ahead(walker(), trajectory.states[-1, -1])
     gait = RefinedGait(trajectory, spring, length, Certificate(()))
     worst = certify_refined(walker(), request, gait).worst
     return Score(*times, trajectory.torque_effort, status, worst.relative, worst.family)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.gait import Certificate, CertificateEntry, Trajectory
-from walk_optimizer.mechanics import Mechanics, foot_arm, horizontal_and_vertical, mechanics_at
+from walk_optimizer.mechanics import Mechanics, foot_2_ahead, horizontal_and_vertical, mechanics_at
 from walk_optimizer.model.kinematics import RELABELLED
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest
@@ -32,7 +32,7 @@ def _relabelled(trajectory: Trajectory, step: FloatArray) -> FloatArray:
 
 def landing_distance(walker: WalkerParameters, trajectory: Trajectory) -> float:
     """Return the step length in [m]: where foot 2 lands, foot 1 having stood at the origin."""
-    return float(foot_arm(walker, trajectory.q[:, -1:], 1).position[0, 0])
+    return foot_2_ahead(walker, trajectory.q[:, -1])
 
 
 def _dynamics_defects(

@@ -29,7 +29,7 @@ from walk_optimizer.library_selection import (
     select,
 )
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
-from walk_optimizer.request import TABLE_SPEED_TOLERANCE
+from walk_optimizer.request import TABLE_SPEED_TOLERANCE, gait_table_settings
 from walk_optimizer.resources import data_folder
 
 __all__ = [
@@ -132,6 +132,25 @@ class GaitLibrary:
     def gaits(self) -> list[Gait]:
         """Return all gaits, by mode, speed and number of points."""
         return [entry.gait for entry in self._entries]
+
+    def table_gaits(self) -> list[Gait]:
+        """Return the gaits of the table's speeds, on its grid.
+
+        Raises:
+            GaitNotFoundError: there are none.
+        """
+        points, speeds = gait_table_settings().points, gait_table_settings().table_speeds()
+        found = [
+            gait
+            for gait in self.gaits()
+            if gait.request.points == points
+            and any(abs(gait.request.speed - speed) < 1e-9 for speed in speeds)
+        ]
+        if not found:
+            raise GaitNotFoundError(
+                f"{self.folder}: no gaits of the table for this walker; solve them with `library build`"
+            )
+        return found
 
     def problems(self) -> list[str]:
         """Return a sentence for each file that was set aside; it begins with the path."""

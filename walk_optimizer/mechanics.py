@@ -141,7 +141,12 @@ def foot_arm(walker: WalkerParameters, q: FloatArray, leg: int) -> Arm:
 
 
 def foot_2_ahead(walker: WalkerParameters, state: FloatArray) -> float:
-    """Return how far foot 2 is ahead of the origin in a state (12,), in [m]: as a step ends, its length."""
+    """Return how far foot 2 is ahead of the origin in [m]: as a step ends, its length.
+
+    Args:
+        walker: The walker.
+        state: Coordinates and momenta (12,), or coordinates alone (6,).
+    """
     return float(foot_arm(walker, state[:6, None], 1).position[0, 0])
 
 

@@ -165,9 +165,9 @@ def _print_table(args: argparse.Namespace) -> int:
     from walk_optimizer.cli.text import markdown_line
     from walk_optimizer.library import GaitLibrary
     from walk_optimizer.simulation.settings import simulation_settings
-    from walk_optimizer.simulation.table import HEADINGS, table_gaits, table_rows
+    from walk_optimizer.simulation.table import HEADINGS, table_rows
 
-    friction, gaits = _friction(args), table_gaits(GaitLibrary(walker_from(args), args.library))
+    friction, gaits = _friction(args), GaitLibrary(walker_from(args), args.library).table_gaits()
     print(markdown_line(HEADINGS), markdown_line(["---"] * len(HEADINGS)), sep="\n")
     for row in table_rows(gaits, simulation_settings(), friction):
         print(markdown_line(row), flush=True)

@@ -56,12 +56,11 @@ def add_parser(verbs: Subparsers) -> None:
 def _table(args: argparse.Namespace) -> "tuple[TransitionTable, list[tuple[Pace, Pace]]]":
     """Return the table and which paces it should join."""
     from walk_optimizer.library import GaitLibrary
-    from walk_optimizer.simulation.table import table_gaits
     from walk_optimizer.transition.builder import table_pairs
     from walk_optimizer.transition.table import TransitionTable, packaged_stand
 
     walker = walker_from(args)
-    pairs = table_pairs(packaged_stand(walker), table_gaits(GaitLibrary(walker)))
+    pairs = table_pairs(packaged_stand(walker), GaitLibrary(walker).table_gaits())
     return TransitionTable(walker, args.folder), pairs
 
 

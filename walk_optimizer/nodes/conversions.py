@@ -2,7 +2,7 @@
 
 import math
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -195,9 +195,8 @@ def certificate_from_message(message: CertificateMessage) -> Certificate:
         GaitFileError: its columns are not equally long.
     """
     columns = (message.family, message.violation, message.unit, message.tolerance)
-    if len(set(map(len, columns))) > 1:
-        raise GaitFileError("gait message: the columns of a certificate are not equally long")
-    return Certificate(tuple(CertificateEntry(*row) for row in zip(*columns, strict=True)))
+    rows = _rows(columns, "gait message: the columns of a certificate")
+    return Certificate(tuple(CertificateEntry(*row) for row in rows))
 
 
 def report_to_message(report: SolveReport) -> SolverReportMessage:
@@ -218,14 +217,13 @@ def report_from_message(message: SolverReportMessage) -> SolveReport:
         GaitFileError: its status is unknown, or its columns are not equally long.
     """
     columns = (message.family, message.violation, message.unit)
-    if len(set(map(len, columns))) > 1:
-        raise GaitFileError("solver report: the columns of its violations are not equally long")
+    rows = _rows(columns, "solver report: the columns of its violations")
     known = [status.value for status in Status]
     if message.status not in known:
         raise GaitFileError(f"solver report: no status {message.status!r}; there are {', '.join(known)}")
     values: dict[str, Any] = {
         "status": Status(message.status),
-        "violations": tuple(FamilyViolation(*row) for row in zip(*columns, strict=True)),
+        "violations": tuple(FamilyViolation(*row) for row in rows),
     }
     same = {one.name for one in fields(SolveReport)} - values.keys()
     return SolveReport(**values, **{name: getattr(message, name) for name in same})
@@ -251,3 +249,14 @@ def _message(kind: type, value: object, **given: Any) -> Any:
 def _columns(entries: Sequence[FamilyViolation], names: Sequence[str]) -> dict[str, list[Any]]:
     """Return attributes of entries as the parallel arrays of a message."""
     return {name: [getattr(entry, name) for entry in entries] for name in names}
+
+
+def _rows(columns: Sequence[Sequence[Any]], what: str) -> Iterable[tuple[Any, ...]]:
+    """Return the rows of a message's parallel arrays.
+
+    Raises:
+        GaitFileError: they are not equally long; says so of `what`.
+    """
+    if len(set(map(len, columns))) > 1:
+        raise GaitFileError(f"{what} are not equally long")
+    return zip(*columns, strict=True)

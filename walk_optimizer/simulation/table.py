@@ -2,10 +2,8 @@
 
 from collections.abc import Iterable, Iterator
 
-from walk_optimizer.errors import GaitNotFoundError
 from walk_optimizer.gait import Gait
-from walk_optimizer.library import GaitLibrary
-from walk_optimizer.request import KMH_PER_MS, gait_table_settings
+from walk_optimizer.request import KMH_PER_MS
 from walk_optimizer.simulation.closed_loop import ClosedLoop, closed_loop
 from walk_optimizer.simulation.ending import Ending
 from walk_optimizer.simulation.linearization import largest_multiplier
@@ -25,26 +23,6 @@ HEADINGS = (
     "5 % heavier",
     "leg 0.01 rad off",
 )
-
-
-def table_gaits(library: GaitLibrary) -> list[Gait]:
-    """Return the gaits of the table's speeds, on its grid.
-
-    Raises:
-        GaitNotFoundError: there are none.
-    """
-    points = gait_table_settings().points
-    speeds = gait_table_settings().table_speeds()
-    found = [
-        gait
-        for gait in library.gaits()
-        if gait.request.points == points and any(abs(gait.request.speed - speed) < 1e-9 for speed in speeds)
-    ]
-    if not found:
-        raise GaitNotFoundError(
-            f"{library.folder}: no gaits of the table for this walker; solve them with `library build`"
-        )
-    return found
 
 
 def table_rows(
