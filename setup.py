@@ -80,7 +80,7 @@ setup(
     ],
     python_requires=">=3.11",
     packages=find_packages(include=["walk_optimizer", "walk_optimizer.*"]),
-    package_data={"walk_optimizer": ["py.typed", "data/**", "multifrontal/*.[ch]"]},
+    package_data={"walk_optimizer": ["py.typed", "data/**", "condensed/*.[ch]", "multifrontal/*.[ch]"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/walk_optimizer"]),
         (SHARE, ["package.xml"]),

@@ -23,6 +23,7 @@ LAYERS = (
     ("transcription",),
     ("guess", "starts"),
     ("solve",),
+    ("condensed",),
     ("gait", "refined_trajectory", "refined_peaks"),
     ("certificate", "replay", "refined_certificate", "shadowing"),
     (

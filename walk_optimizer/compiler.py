@@ -1,5 +1,6 @@
 """Compiles C code to shared libraries once, and keeps them for the next process."""
 
+import ctypes
 import hashlib
 import logging
 import os
@@ -12,6 +13,8 @@ from pathlib import Path
 
 _LOGGER = logging.getLogger(__name__)
 COMPILER_VARIABLE = "WALK_OPTIMIZER_CC"
+# For this processor and no other: dense kernels run twice as fast with its widest vectors.
+_NATIVE_FLAGS = ("-std=gnu11", "-pthread", "-O3", "-march=native", "-fopenmp-simd", "-fvisibility=hidden")
 
 
 def cache_folder() -> Path:
@@ -72,3 +75,48 @@ def compile_library(
         command = [compiler, *flags, "-fPIC", "-shared", *files, "-o", str(scratch), "-lm"]
         subprocess.run(command, check=True, capture_output=True)
         scratch.replace(library)
+
+
+def native_library(folder: Path, instead: str) -> Path | None:
+    """Return the shared library of a folder's C files for this processor; None where it can't be had.
+
+    That is without a C compiler, with an empty `WALK_OPTIMIZER_CC`, or with a cache that can't be
+    written. It is compiled where the cache has none that loads.
+
+    Args:
+        folder: Of the C files; the library bears its name.
+        instead: What is used without the library, for warnings.
+    """
+    compiler = find_compiler(instead)
+    if compiler is None:
+        return None
+    sources = sorted(folder.glob("*.[ch]"))
+    contents = [_processor(), *(path.read_bytes() for path in sources)]
+    library = library_path(folder.name, compiler, _NATIVE_FLAGS, contents)
+    try:
+        if not (library.is_file() and _loads(library)):
+            units = [path for path in sources if path.suffix == ".c"]
+            compile_library(library, compiler, _NATIVE_FLAGS, lambda _: units)
+        ctypes.CDLL(str(library))
+    except (OSError, subprocess.CalledProcessError) as error:
+        _LOGGER.warning("the C code of %s can't be compiled (%s); %s is used", folder.name, error, instead)
+        return None
+    return library
+
+
+def _loads(library: Path) -> bool:
+    try:
+        ctypes.CDLL(str(library))
+    except OSError:
+        _LOGGER.warning("%s is damaged and is compiled again", library)
+        return False
+    return True
+
+
+def _processor() -> bytes:
+    """Return the instruction sets of this processor, which a home folder on a network may not share."""
+    try:
+        lines = Path("/proc/cpuinfo").read_bytes().splitlines()
+    except OSError:
+        return b""
+    return next((line for line in lines if line.startswith((b"flags", b"Features"))), b"")

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from walk_optimizer.condensed.solve import solve_condensed
 from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.gait import Certificate, Gait, RefinedGait
@@ -21,6 +22,7 @@ from walk_optimizer.transcription.mesh import Mesh, RefinedPoints, even_mesh, wi
 from walk_optimizer.transcription.phases import (
     INSTANT_POINTS,
     Phase,
+    is_single_support,
     phase_shares,
     phases_of,
     with_steady_end,
@@ -31,6 +33,7 @@ from walk_optimizer.transcription.scaling import torque_unit
 
 FloatArray = NDArray[np.float64]
 
+_STAGE = "refinement"
 _FEWEST_INTERVALS = 3
 _MOST_PHASES = 6
 _ROUNDS = 10
@@ -152,7 +155,7 @@ class RefinedSolves:
             if errors.met:
                 return replace(best, met=True)
             finer = errors.divided(mesh)
-            best = self.solved(finer, resampled(trajectory, best.spring, mesh, finer))
+            best = self.solved_nearby(finer, resampled(trajectory, best.spring, mesh, finer))
         return best
 
     def certified(self, solution: RefinedSolution) -> RefinedGait | None:
@@ -168,7 +171,29 @@ class RefinedSolves:
     def _on_halves(self, mesh: Mesh, trajectory: RefinedTrajectory, spring: KneeSpring) -> RefinedSolution:
         """Return the solution on a mesh whose less accurate intervals are halved."""
         finer = MeshErrors.of(self.walker, self.request.step_length, spring, trajectory).halved(mesh)
-        return self.solved(finer, resampled(trajectory, spring, mesh, finer))
+        return self.solved_nearby(finer, resampled(trajectory, spring, mesh, finer))
+
+    def solved_nearby(self, mesh: Mesh, points: RefinedPoints) -> RefinedSolution:
+        """Return the solution on one mesh from a start that is near it, condensed where that can be done.
+
+        Args:
+            mesh: Phases and intervals.
+            points: First guess.
+        """
+        if self.session.condenses and is_single_support(mesh.phases) and not self.session.stopped:
+            monitor = self.session.monitor(_STAGE, self._objective_unit)
+            lengths = mesh.lengths(points.durations)
+            found = solve_condensed(self.request, self.walker, lengths, points, monitor)
+            self.session.iterations += found.iterations
+            if found.points is not None:
+                return RefinedSolution(
+                    found.status, mesh, trajectory_on(mesh, found.points), found.points.spring
+                )
+        return self.solved(mesh, points)
+
+    @property
+    def _objective_unit(self) -> float:
+        return float(torque_unit(self.walker)) ** 2 / self.request.interval
 
     def solved(
         self, mesh: Mesh, points: RefinedPoints, most_iterations: int = _MOST_ITERATIONS
@@ -181,10 +206,13 @@ class RefinedSolves:
             most_iterations: Iteration limit.
         """
         refined = RefinedProblem(self.request, self.walker, mesh)
-        unit = torque_unit(self.walker) ** 2 / self.request.interval
         options = replace(self.session.options, barrier=BARRIER, maximum_iterations=most_iterations)
         solution = self.session.solve(
-            refined.problem(), refined.pack(points), "refinement", objective_unit=unit, options=options
+            refined.problem(),
+            refined.pack(points),
+            _STAGE,
+            objective_unit=self._objective_unit,
+            options=options,
         )
         if not solution.solved:
             return RefinedSolution(solution.status, mesh, None, points.spring)

@@ -52,7 +52,7 @@ def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSess
     guess = _at_pace(_between(guesses[0], guesses[-1], _share(request, neighbours)), request.step_time)
     walker = neighbours[0].walker
     solves = RefinedSolves(request, walker, session)
-    solution = solves.solved(mesh, guess)
+    solution = solves.solved_nearby(mesh, guess)
     gait = certified_refinement(walker, request, solution)
     return gait or solves.certified(solves.adapted(solution))
 

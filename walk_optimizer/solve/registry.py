@@ -21,6 +21,8 @@ class BackEndEntry:
         plugin: CasADi's name of it; empty for one that comes from elsewhere.
         package: Python package that it needs beside CasADi; empty for none.
         remedy: What to do where it is missing.
+        condenses: Whether steps in single support that begin near a solution are left to the condensed
+            method: an interior point as well, which knows such steps.
     """
 
     name: str
@@ -28,6 +30,7 @@ class BackEndEntry:
     plugin: str = ""
     package: str = ""
     remedy: str = "install the wheel casadi==3.8.2, whose build has it"
+    condenses: bool = False
 
     @property
     def missing(self) -> str | None:
@@ -46,7 +49,7 @@ class BackEndEntry:
 BACK_ENDS = {
     entry.name: entry
     for entry in (
-        BackEndEntry("ipopt", "interior point, sparse factorisation", plugin="ipopt"),
+        BackEndEntry("ipopt", "interior point, sparse factorisation", plugin="ipopt", condenses=True),
         BackEndEntry("uno", "sequential quadratic programming, filter and trust region", plugin="uno"),
         BackEndEntry("fatrop", "interior point, Riccati recursion along the stages", plugin="fatrop"),
         BackEndEntry(

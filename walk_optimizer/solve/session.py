@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from walk_optimizer.solve.back_end import SolveOptions
-from walk_optimizer.solve.registry import back_end
+from walk_optimizer.solve.registry import BACK_ENDS, back_end
 from walk_optimizer.solve.settings import SolverSettings
 from walk_optimizer.solve.sharing import Shares, processor_count
-from walk_optimizer.solve.solution import FloatArray, IterationState, Solution
+from walk_optimizer.solve.solution import FloatArray, IterationState, Monitor, Solution
 from walk_optimizer.solve.status import Progress, ProgressCallback, Status
 from walk_optimizer.transcription.program import Problem
 
@@ -46,6 +46,11 @@ class SolveSession:
         return SolveOptions(self._settings.tolerance, self._settings.maximum_iterations)
 
     @property
+    def condenses(self) -> bool:
+        """Whether near starts in single support are left to the condensed method."""
+        return BACK_ENDS[self._settings.back_end].condenses
+
+    @property
     def elapsed(self) -> float:
         """Time since the session began in [s]."""
         return time.monotonic() - self._begin
@@ -73,13 +78,18 @@ class SolveSession:
             objective_unit: What one unit of the scaled objective is, in [(N m)^2].
             options: Of the back end; by default those of the session.
         """
+        monitor = self.monitor(stage, objective_unit)
+        solution = self._back_end.solve(problem, start, options or self.options, monitor)
+        self.iterations += solution.iterations
+        return solution
+
+    def monitor(self, stage: str, objective_unit: float) -> Monitor:
+        """Return what a solve of the session tells its iterations; arguments as for `solve`."""
 
         def monitor(state: IterationState) -> Status | None:
             return self._watch(state, stage, objective_unit)
 
-        solution = self._back_end.solve(problem, start, options or self.options, monitor)
-        self.iterations += solution.iterations
-        return solution
+        return monitor
 
     def map(self, function: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
         """Return what a function of solves gives for each item, all processors working on them.

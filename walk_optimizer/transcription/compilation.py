@@ -52,6 +52,20 @@ def compiled(build: Callable[..., list[ca.Function]], *arguments: Hashable) -> d
     return functions
 
 
+def machine_code(build: Callable[..., list[ca.Function]], *arguments: Hashable) -> Path | None:
+    """Return the shared library of the functions that `build` makes; None where they are interpreted.
+
+    Args:
+        build: As for `compiled`.
+        arguments: Of `build`.
+    """
+    compiler = find_compiler(_INTERPRETER)
+    if compiler is None:
+        return None
+    compiled(build, *arguments)
+    return _Note(build, arguments, compiler).library()
+
+
 def _named(functions: Iterable[ca.Function]) -> dict[str, ca.Function]:
     return {function.name(): function for function in functions}
 
@@ -77,6 +91,13 @@ class _Note:
             note = json.loads(self._path.read_text())
             return _loaded(note["functions"], cache_folder() / note["library"])
         except (OSError, ValueError, TypeError, KeyError, RuntimeError):
+            return None
+
+    def library(self) -> Path | None:
+        """Return the library; None without the note."""
+        try:
+            return cache_folder() / str(json.loads(self._path.read_text())["library"])
+        except (OSError, ValueError, TypeError, KeyError):
             return None
 
     def write(self, library: Path, functions: list[str]) -> None:

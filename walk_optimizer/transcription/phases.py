@@ -40,6 +40,12 @@ class Phase:
         return any(mode is not FootMode.FREE for mode in self.impact)
 
 
+def is_single_support(phases: tuple[Phase, ...]) -> bool:
+    """Return whether foot 1 lands, stands and sticks all through the step, while foot 2 swings."""
+    alone = (FootMode.STICK, FootMode.FREE)
+    return [(one.modes, one.impact, one.landing) for one in phases] == [(alone, alone, (True, False))]
+
+
 def phase_shares(phases: tuple[Phase, ...]) -> NDArray[np.float64]:
     """Return the lengths of a step's phases as parts of it; they add up to 1."""
     return np.diff([phase.start for phase in phases] + [1.0])

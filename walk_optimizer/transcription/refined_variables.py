@@ -71,7 +71,7 @@ class RefinedVariables:
         count, phases = self.mesh.intervals, len(self.mesh.phases)
         states = state_bounds(self.walker)
         modes = [self.mesh.phases[k].modes for k in self.mesh.phase_of_interval]
-        least = _least_vertical_force(self.walker)
+        least = least_vertical_force(self.walker)
         forces = np.array([force_bounds(one, least) for one in modes]).transpose(1, 0, 2)
         impulses = np.array([force_bounds(phase.impact) for phase in self.mesh.phases]).transpose(1, 0, 2)
         lower, upper = (
@@ -149,7 +149,7 @@ class RefinedVariables:
         )
 
 
-def _least_vertical_force(walker: WalkerParameters) -> float:
+def least_vertical_force(walker: WalkerParameters) -> float:
     """Return a vertical force in [N] within the friction cone that loads a foot as it has to be.
 
     On a slope a, n = f_y cos a - f_x sin a is the normal force and t, |t| <= mu n, the tangential one: then

@@ -1,0 +1,122 @@
+"""Condensed solves find what IPOPT finds on the same mesh, and give up where they don't."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from condensed.conftest import start_of
+
+from walk_optimizer.condensed import interior_point, solve
+from walk_optimizer.condensed.solve import solve_condensed
+from walk_optimizer.gait import Certificate, RefinedGait
+from walk_optimizer.mechanics import foot_2_ahead
+from walk_optimizer.mesh_adaptation import trajectory_on
+from walk_optimizer.refined_certificate import certify_refined
+from walk_optimizer.refinement import RefinedSolves
+from walk_optimizer.request import GaitRequest
+from walk_optimizer.resolve import resolve
+from walk_optimizer.solve.session import SolveSession
+from walk_optimizer.solve.settings import solver_settings
+from walk_optimizer.solve.status import Status
+
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+
+
+def session():
+    return SolveSession(solver_settings(), 300.0, None)
+
+
+def go_on(state):
+    return None
+
+
+def condensed(start, request, walker=None, monitor=go_on):
+    lengths = start.mesh.lengths(np.array([request.step_time]))
+    return solve_condensed(request, walker or start.gait.walker, lengths, start.points, monitor)
+
+
+def certificate_of(walker, request, start, points):
+    trajectory = trajectory_on(start.mesh, points)
+    length = foot_2_ahead(walker, trajectory.states[-1, -1])
+    bare = RefinedGait(trajectory, points.spring, length, Certificate(()))
+    return certify_refined(walker, request, bare)
+
+
+@needs_compiler
+def test_the_solution_is_ipopts(start):
+    speed = 1.01 * start.gait.request.speed
+    request = GaitRequest.for_speed(speed, start.gait.request.spring_mode)
+    ours = condensed(start, request)
+    assert ours.status is Status.SOLVED
+    durations = np.array([request.step_time])
+    theirs = RefinedSolves(request, start.gait.walker, session()).solved(
+        start.mesh, replace(ours.points, durations=durations)
+    )
+    trajectory = trajectory_on(start.mesh, ours.points)
+    assert trajectory.torque_effort == pytest.approx(theirs.effort, rel=1e-5)
+    np.testing.assert_allclose(trajectory.states[:, :, :6], theirs.trajectory.states[:, :, :6], atol=2e-4)
+    assert ours.points.spring.stiffness == pytest.approx(theirs.spring.stiffness, rel=1e-3, abs=1e-6)
+    assert ours.points.spring.equilibrium == pytest.approx(theirs.spring.equilibrium, abs=1e-3)
+
+
+@needs_compiler
+@pytest.mark.parametrize("margin", ["landing_speed", "stance_load"])
+def test_margins_are_kept(library, margin):
+    start = start_of(library, 0.53, "stiffness")
+    walker = replace(start.gait.walker, **{margin: {"landing_speed": 0.5, "stance_load": 0.75}[margin]})
+    kept = {}
+    for asked in (start.gait.walker, walker):
+        found = condensed(start, start.gait.request, asked)
+        assert found.status is Status.SOLVED
+        entries = certificate_of(walker, start.gait.request, start, found.points).entries
+        # The mesh is that of the other gait: between its nodes, and when replayed, more is lost.
+        broken = [one for one in entries if not one.violation <= one.tolerance]
+        kept[asked] = {one.family for one in broken} - {"joint_limits_between", "interval_replay"}
+    assert kept == {start.gait.walker: {margin}, walker: set()}
+
+
+@needs_compiler
+def test_what_it_tells_is_true_and_it_ends_when_told_to(start):
+    told = []
+
+    def monitor(state):
+        told.append(state)
+        return Status.CANCELLED if state.iteration == 3 else None
+
+    request = GaitRequest.for_speed(1.02 * start.gait.request.speed, start.gait.request.spring_mode)
+    found = condensed(start, request, monitor=monitor)
+    assert found.status is Status.CANCELLED
+    assert found.points is None
+    assert [state.iteration for state in told] == [0, 1, 2, 3]
+    assert all(state.objective > 0 for state in told)
+    assert told[3].infeasibility < told[0].infeasibility
+
+
+@needs_compiler
+def test_values_that_are_no_numbers_end_it(start):
+    points = replace(start.points, states=np.full_like(start.points.states, np.nan))
+    found = condensed(replace(start, points=points), start.gait.request)
+    assert found.status is Status.EVALUATION_ERROR
+    assert found.points is None
+
+
+@pytest.mark.parametrize("lost", ["iterations", "compiler"])
+def test_ipopt_takes_over_where_it_does_not_come_to_an_end(monkeypatch, library, lost):
+    if lost == "iterations":
+        monkeypatch.setattr(interior_point, "_MOST_ITERATIONS", 2)
+    else:
+        monkeypatch.setattr(solve, "kernel", lambda: None)
+    start = start_of(library, 0.53, "none")
+    request = GaitRequest.for_speed(0.54, "none")
+    gait = resolve(request, [start.gait], session())
+    assert gait.certificate.certified
+
+
+@needs_compiler
+def test_another_back_end_is_not_bypassed(monkeypatch, library):
+    monkeypatch.setattr("walk_optimizer.refinement.solve_condensed", lambda *_: pytest.fail("it was"))
+    settings = replace(solver_settings(), back_end="uno")
+    start = start_of(library, 0.53, "none")
+    solves = RefinedSolves(start.gait.request, start.gait.walker, SolveSession(settings, 0.5, None))
+    solves.solved_nearby(start.mesh, start.points)

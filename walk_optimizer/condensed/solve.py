@@ -1,0 +1,118 @@
+"""Solves for the gait of a new speed from one nearby, in single support."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walk_optimizer.condensed.ends import EXCHANGED, Ends
+from walk_optimizer.condensed.functions import ANGLES, hip_functions
+from walk_optimizer.condensed.interior_point import InteriorPoint
+from walk_optimizer.condensed.kernel import kernel
+from walk_optimizer.condensed.step import BUTCHER, CondensedStep, Unknowns
+from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.request import GaitRequest
+from walk_optimizer.solve.sharing import free_processors
+from walk_optimizer.solve.solution import Monitor
+from walk_optimizer.solve.status import Status
+from walk_optimizer.transcription.compilation import compiled
+from walk_optimizer.transcription.mesh import RefinedPoints
+from walk_optimizer.transcription.scaling import spring_units, torque_unit
+from walk_optimizer.transcription.tableau import DIFFERENTIATION, STAGES, STATE_COEFFICIENTS
+
+FloatArray = NDArray[np.float64]
+
+_ANGLE_ROWS = slice(2, 6)
+_MOST_THREADS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedSolution:
+    """Where a condensed solve ended.
+
+    Attributes:
+        status: How it ended.
+        iterations: Number of iterations.
+        points: The solution; None unless it was solved.
+    """
+
+    status: Status
+    iterations: int
+    points: RefinedPoints | None
+
+
+def solve_condensed(
+    request: GaitRequest,
+    walker: WalkerParameters,
+    lengths: FloatArray,
+    guess: RefinedPoints,
+    monitor: Monitor,
+) -> CondensedSolution:
+    """Return the solution near a guess; without a C compiler there is none.
+
+    It solves the same equations as the refined problem of single support, to the same solution.
+
+    Args:
+        request: Speed, step and spring mode.
+        walker: The walker.
+        lengths: Of the intervals in [s], (n,); they add up to the time of the step.
+        guess: First guess on these intervals.
+        monitor: Told at each iteration.
+    """
+    code = kernel()
+    if code is None:
+        return CondensedSolution(Status.SOLVER_ERROR, 0, None)
+    ends = Ends(request, walker)
+    unknowns = Unknowns(lengths.size, len(ends.equations), ends.size)
+    threads = min(_MOST_THREADS, free_processors())
+    step = CondensedStep(code, walker, request.step_length, lengths, unknowns, threads)
+    begin(step, walker, guess)
+    status, iterations = InteriorPoint(step, ends).solve(monitor)
+    points = _solution(step, ends, walker) if status is Status.SOLVED else None
+    return CondensedSolution(status, iterations, points)
+
+
+def begin(step: CondensedStep, walker: WalkerParameters, guess: RefinedPoints) -> None:
+    """Set the iterate to a guess, its angles closed to a cycle."""
+    angles, lengths = guess.states[:, :, _ANGLE_ROWS], step.lengths
+    omega = np.einsum("ij,nja->nia", DIFFERENTIATION, angles) / lengths[:, None, None]
+    travelled = np.einsum("n,j,nja->a", lengths, BUTCHER[-1], omega)
+    first = angles[0, 0]
+    omega += (first[EXCHANGED] - first - travelled) / lengths.sum()
+    after = STATE_COEFFICIENTS[1] @ angles[0] / lengths[0]
+    unknowns, iterate = step.unknowns, step.iterate
+    unknowns.of(iterate, "omega")[:] = omega.reshape(-1, ANGLES)
+    unknowns.of(iterate, "start")[:] = np.concatenate([first, after])
+    springs = np.array([guess.spring.stiffness, guess.spring.equilibrium])
+    unknowns.of(iterate, "springs")[:] = springs / np.array(spring_units(walker), dtype=float)
+    unknowns.of(iterate, "torques")[:] = guess.torques.reshape(-1, 3) / float(torque_unit(walker))
+
+
+def _solution(step: CondensedStep, ends: Ends, walker: WalkerParameters) -> RefinedPoints:
+    """Return the values on the refined grid that angles and velocities of the iterate determine."""
+    step.evaluate(settle=True)
+    ends.evaluate(step)
+    count = step.lengths.size
+    start = step.unknowns.of(step.iterate, "start")
+    angles = np.concatenate([start[None, :ANGLES], step.y[:, :ANGLES]])
+    velocities = np.concatenate([start[None, ANGLES:], step.y[:, ANGLES : 2 * ANGLES]])
+    function = compiled(hip_functions)["condensed_hip"].map(len(angles))
+    hip, hip_velocity = (np.asarray(one).T for one in function(angles.T, velocities.T, step.walker_vector))
+    moved = np.einsum("n,ij,njx->nix", step.lengths, BUTCHER, hip_velocity[1:].reshape(count, STAGES, 2))
+    starts = hip[0] + np.concatenate([np.zeros((1, 2)), np.cumsum(moved[:, -1], axis=0)[:-1]])
+    places = np.concatenate([hip[:1], (starts[:, None] + moved).reshape(-1, 2)])
+    states = np.concatenate([places, angles, step.true_momenta], axis=1)
+    nodes = states[1:].reshape(count, STAGES, 12)
+    forces = np.zeros((count, STAGES, 4))
+    forces[:, :, :2] = step.y[:, 8:10].reshape(count, STAGES, 2) + np.array([0.0, walker.weight])
+    stiffness, equilibrium = step.unknowns.of(step.iterate, "springs") * np.array(
+        spring_units(walker), dtype=float
+    )
+    return RefinedPoints(
+        states=np.concatenate([states[0 : 3 * count : STAGES][:, None], nodes], axis=1),
+        torques=step.rows[:, :3].reshape(count, STAGES, 3) * float(torque_unit(walker)),
+        forces=forces,
+        durations=np.array([step.lengths.sum()]),
+        impulses=np.concatenate([ends.impulse(), np.zeros(2)])[None],
+        spring=KneeSpring(float(stiffness), float(equilibrium)),
+    )
