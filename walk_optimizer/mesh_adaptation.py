@@ -67,6 +67,24 @@ class MeshErrors:
         return mesh.divided(np.where(self.local > np.median(self.local), 2, 1))
 
 
+def torque_saved(
+    walker: WalkerParameters, step_length: float, trajectory: RefinedTrajectory, prices: FloatArray
+) -> float:
+    """Return which part of the objective a solution saves by leaving its bounds between the nodes.
+
+    That is how far it leaves them, times the multipliers of the bounds at the nodes of the interval.
+
+    Args:
+        walker: The walker.
+        step_length: Of the request, in [m].
+        trajectory: The solution.
+        prices: What each interval's joint limits cost per [rad], and the ground per [m], as parts of the
+            objective, (n, 2).
+    """
+    excess = excess_between(walker, step_length, trajectory)
+    return float(np.sum(np.stack(excess, axis=1) * prices))
+
+
 def trajectory_on(mesh: Mesh, points: RefinedPoints) -> RefinedTrajectory:
     """Return the values on a mesh as a trajectory."""
     breaks = np.concatenate([[0.0], np.cumsum(mesh.lengths(points.durations))])

@@ -58,6 +58,7 @@ class RefinedSolution:
         spring: K and q_eq.
         local_error: Largest error of an interval in [rad] or [m]; infinite before it is estimated.
         met: Whether the mesh is fine enough for the error.
+        prices: What it would save to leave bounds, see `torque_saved`; None where that is not known.
     """
 
     status: Status
@@ -66,6 +67,7 @@ class RefinedSolution:
     spring: KneeSpring
     local_error: float = np.inf
     met: bool = False
+    prices: FloatArray | None = None
 
     @property
     def effort(self) -> float:
@@ -186,9 +188,8 @@ class RefinedSolves:
             found = solve_condensed(self.request, self.walker, lengths, points, monitor)
             self.session.iterations += found.iterations
             if found.points is not None:
-                return RefinedSolution(
-                    found.status, mesh, trajectory_on(mesh, found.points), found.points.spring
-                )
+                trajectory, spring = trajectory_on(mesh, found.points), found.points.spring
+                return RefinedSolution(found.status, mesh, trajectory, spring, prices=found.prices)
         return self.solved(mesh, points)
 
     @property

@@ -1,7 +1,8 @@
 """Solves for a new speed from refined gaits of neighbouring speeds, without the report's grid.
 
 The neighbours are interpolated on the finer one's mesh, which is close enough to the new optimum for a
-few iterations, and for the mesh to be fine enough: it is divided only if the certificate fails.
+few iterations, and mostly for the mesh to be fine enough: it is divided only if the certificate fails, or
+if too much torque is saved where bounds are left between the nodes.
 """
 
 from collections.abc import Sequence
@@ -13,9 +14,9 @@ from numpy.typing import NDArray
 from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import Gait, RefinedGait
-from walk_optimizer.mesh_adaptation import resampled
-from walk_optimizer.model.parameters import KneeSpring
-from walk_optimizer.refinement import RefinedSolves, certified_refinement
+from walk_optimizer.mesh_adaptation import resampled, torque_saved
+from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
+from walk_optimizer.refinement import RefinedSolution, RefinedSolves, certified_refinement
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.transcription.layout import P
@@ -23,6 +24,9 @@ from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
 from walk_optimizer.transcription.phases import phases_of
 
 FloatArray = NDArray[np.float64]
+
+# Part of the objective that a solution may save by leaving its bounds between the nodes.
+_MOST_SAVED = 1e-3
 
 
 def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSession) -> RefinedGait | None:
@@ -53,8 +57,17 @@ def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSess
     walker = neighbours[0].walker
     solves = RefinedSolves(request, walker, session)
     solution = solves.solved_nearby(mesh, guess)
-    gait = certified_refinement(walker, request, solution)
+    fine = _is_fine_enough(walker, request, solution)
+    gait = certified_refinement(walker, request, solution) if fine else None
     return gait or solves.certified(solves.adapted(solution))
+
+
+def _is_fine_enough(walker: WalkerParameters, request: GaitRequest, solution: RefinedSolution) -> bool:
+    """Return whether a solution on a neighbour's mesh has about the objective of a finer one."""
+    if solution.trajectory is None or solution.prices is None:
+        return False
+    saved = torque_saved(walker, request.step_length, solution.trajectory, solution.prices)
+    return saved <= _MOST_SAVED
 
 
 def continued(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSession) -> RefinedGait | None:

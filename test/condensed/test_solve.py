@@ -11,7 +11,7 @@ from walk_optimizer.condensed import interior_point, solve
 from walk_optimizer.condensed.solve import solve_condensed
 from walk_optimizer.gait import Certificate, RefinedGait
 from walk_optimizer.mechanics import foot_2_ahead
-from walk_optimizer.mesh_adaptation import trajectory_on
+from walk_optimizer.mesh_adaptation import resampled, torque_saved, trajectory_on
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refinement import RefinedSolves
 from walk_optimizer.request import GaitRequest
@@ -19,6 +19,7 @@ from walk_optimizer.resolve import resolve
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.status import Status
+from walk_optimizer.transcription.mesh import even_mesh
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 
@@ -111,6 +112,21 @@ def test_ipopt_takes_over_where_it_does_not_come_to_an_end(monkeypatch, library,
     request = GaitRequest.for_speed(0.54, "none")
     gait = resolve(request, [start.gait], session())
     assert gait.certificate.certified
+
+
+@needs_compiler
+@pytest.mark.parametrize("speed", [0.235, 0.32, 0.53])
+def test_prices_tell_what_leaving_bounds_between_the_nodes_saves(library, speed):
+    start = start_of(library, speed, "none")
+    gait, fine = start.gait, start.gait.refined
+    coarse = even_mesh([start.mesh.phases], 3)
+    points = resampled(fine.trajectory, fine.spring, start.mesh, coarse)
+    found = condensed(replace(start, mesh=coarse, points=points), gait.request)
+    trajectory = trajectory_on(coarse, found.points)
+    saved = torque_saved(gait.walker, gait.request.step_length, trajectory, found.prices)
+    actual = 1 - trajectory.torque_effort / fine.trajectory.torque_effort
+    assert actual > 5e-5, "the mesh is too fine for this test"
+    assert saved == pytest.approx(actual, rel=0.5)
 
 
 @needs_compiler

@@ -1,5 +1,7 @@
 """New speeds straight from refined gaits of the library."""
 
+import math
+import shutil
 from dataclasses import replace
 
 import pytest
@@ -8,6 +10,7 @@ from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.optimizer import with_continuation
+from walk_optimizer.refinement import RefinedSolves
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.resolve import continued, resolve
 from walk_optimizer.solve.session import SolveSession
@@ -72,3 +75,20 @@ def test_no_shipped_gait_without_springs_is_worse_than_the_continuation_of_its_n
     for index, gait in enumerate(neighbours):
         seeds = neighbours[max(index - 1, 0) : index] + neighbours[index + 1 : index + 2]
         assert with_continuation(gait, seeds, session()) is gait, f"{gait.speed:.4f} m/s"
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@pytest.mark.parametrize("most_saved", [math.inf, -math.inf])
+def test_a_mesh_is_divided_where_leaving_bounds_between_its_nodes_saves_too_much(
+    neighbours, monkeypatch, most_saved
+):
+    adapted = []
+    original = RefinedSolves.adapted
+    monkeypatch.setattr(
+        RefinedSolves, "adapted", lambda *arguments: adapted.append(1) or original(*arguments)
+    )
+    monkeypatch.setattr("walk_optimizer.resolve._MOST_SAVED", most_saved)
+    slower = neighbours[1]
+    gait = resolve(GaitRequest.for_speed(1.01 * slower.request.speed, "none"), [slower], session())
+    assert gait.certificate.certified
+    assert bool(adapted) == (most_saved < 0)

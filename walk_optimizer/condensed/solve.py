@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from walk_optimizer.condensed.ends import EXCHANGED, Ends
 from walk_optimizer.condensed.functions import ANGLES, hip_functions
 from walk_optimizer.condensed.interior_point import InteriorPoint
-from walk_optimizer.condensed.kernel import kernel
+from walk_optimizer.condensed.kernel import GAP_LIMIT, LIMITS, kernel
 from walk_optimizer.condensed.step import BUTCHER, CondensedStep, Unknowns
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
@@ -34,11 +34,14 @@ class CondensedSolution:
         status: How it ended.
         iterations: Number of iterations.
         points: The solution; None unless it was solved.
+        prices: What each interval's joint limits cost per [rad], and the ground under foot 2 per [m], as
+            parts of the objective, (n, 2); None without a solution.
     """
 
     status: Status
     iterations: int
-    points: RefinedPoints | None
+    points: RefinedPoints | None = None
+    prices: FloatArray | None = None
 
 
 def solve_condensed(
@@ -61,15 +64,16 @@ def solve_condensed(
     """
     code = kernel()
     if code is None:
-        return CondensedSolution(Status.SOLVER_ERROR, 0, None)
+        return CondensedSolution(Status.SOLVER_ERROR, 0)
     ends = Ends(request, walker)
     unknowns = Unknowns(lengths.size, len(ends.equations), ends.size)
     threads = min(_MOST_THREADS, free_processors())
     step = CondensedStep(code, walker, request.step_length, lengths, unknowns, threads)
     begin(step, walker, guess)
     status, iterations = InteriorPoint(step, ends).solve(monitor)
-    points = _solution(step, ends, walker) if status is Status.SOLVED else None
-    return CondensedSolution(status, iterations, points)
+    if status is not Status.SOLVED:
+        return CondensedSolution(status, iterations)
+    return CondensedSolution(status, iterations, _solution(step, ends, walker), _prices(step, walker))
 
 
 def begin(step: CondensedStep, walker: WalkerParameters, guess: RefinedPoints) -> None:
@@ -86,6 +90,14 @@ def begin(step: CondensedStep, walker: WalkerParameters, guess: RefinedPoints) -
     springs = np.array([guess.spring.stiffness, guess.spring.equilibrium])
     unknowns.of(iterate, "springs")[:] = springs / np.array(spring_units(walker), dtype=float)
     unknowns.of(iterate, "torques")[:] = guess.torques.reshape(-1, 3) / float(torque_unit(walker))
+
+
+def _prices(step: CondensedStep, walker: WalkerParameters) -> FloatArray:
+    """Return the prices of a solution: the multipliers of its inequalities."""
+    at_nodes = step.unknowns.of(step.iterate, "multipliers")[: step.limits.size]
+    of_intervals = at_nodes.reshape(-1, STAGES, LIMITS).sum(axis=1)
+    angles, gap = of_intervals[:, : 2 * ANGLES].sum(axis=1), of_intervals[:, GAP_LIMIT] / walker.leg_length
+    return np.stack([angles, gap], axis=1) / step.objective()
 
 
 def _solution(step: CondensedStep, ends: Ends, walker: WalkerParameters) -> RefinedPoints:
