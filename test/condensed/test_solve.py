@@ -12,6 +12,8 @@ from walk_optimizer.condensed.solve import solve_condensed
 from walk_optimizer.gait import Certificate, RefinedGait
 from walk_optimizer.mechanics import foot_2_ahead
 from walk_optimizer.mesh_adaptation import resampled, torque_saved, trajectory_on
+from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.optimizer import optimize
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refinement import RefinedSolves
 from walk_optimizer.request import GaitRequest
@@ -75,6 +77,15 @@ def test_margins_are_kept(library, margin):
         broken = [one for one in entries if not one.violation <= one.tolerance]
         kept[asked] = {one.family for one in broken} - {"joint_limits_between", "interval_replay"}
     assert kept == {start.gait.walker: {margin}, walker: set()}
+
+
+@needs_compiler
+def test_the_forward_momentum_stays_positive_where_it_would_not():
+    """In a long, slow step the walker would like to wait for the swing leg."""
+    outcome = optimize(GaitRequest.for_step(0.5, 2.4, "none", 40), WalkerParameters.from_yaml())
+    momentum = outcome.gait.refined.trajectory.states[:, 1:, 6]
+    assert np.count_nonzero(momentum < 1e-2) > 3, "the bound is not reached"
+    assert momentum.min() > -1e-5
 
 
 @needs_compiler

@@ -63,6 +63,7 @@ static void point_hessian(const Step *step, int k, int i, double *q) {
     int node = NODES * k + i;
     const double *hessian = step->hessian + POINT * POINT * node;
     const double *jacobian = step->row_jacobian + ROWS * POINT * node;
+    const double *forward = step->momentum_jacobian + MOMENTA * STATE * (node + 1);
     double weights[LIMITS], share = step->lengths[k] * step->quadrature[i];
     for (int r = 0; r < LIMITS; r++)
         weights[r] = step->multipliers[LIMITS * node + r] / step->slacks[LIMITS * node + r];
@@ -75,6 +76,9 @@ static void point_hessian(const Step *step, int k, int i, double *q) {
             for (int b = 0; b < POINT; b++) q[POINT * a + b] += factor * row[a] * row[b];
     }
     for (int a = 0; a < ANGLES; a++) q[POINT * a + a] += weights[a] + weights[ANGLES + a];
+    double of_forward = weights[FORWARD_LIMIT] / (step->mass * step->mass);
+    for (int a = 0; a < STATE; a++)
+        for (int b = 0; b < STATE; b++) q[POINT * a + b] += of_forward * forward[a] * forward[b];
     for (int r = 0; r < CONES; r++)
         for (int a = 0; a < 2; a++)
             for (int b = 0; b < 2; b++)

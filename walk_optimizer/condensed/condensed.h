@@ -4,8 +4,9 @@
  *
  *     y = (theta 4, omega 4, momentum rate 6, K and q_eq 2),
  *
- * its five rows are u1, u2, u3, the row that no torque acts on, and the gap of the swing foot; its twelve
- * inequalities are lower and upper bounds of theta, the gap, both sides of the friction cone, and the load.
+ * its five rows are u1, u2, u3, the row that no torque acts on, and the gap of the swing foot; its thirteen
+ * inequalities are lower and upper bounds of theta, the gap, both sides of the friction cone, the load, and
+ * the forward momentum.
  * An interval's condensed variables are
  *
  *     xi = (omega at its nodes 12, theta and omega at its start 8, K and q_eq 2),
@@ -26,9 +27,10 @@ enum {
     TORQUES = 3,
     PASSIVE = 3, /* the row without a torque */
     GAP = 4,
-    LIMITS = 12,
+    LIMITS = 13,
     GAP_LIMIT = 8,
     CONE_LIMIT = 9,
+    FORWARD_LIMIT = 12,
     CONES = 3,
     FREE = 12,       /* condensed variables of an interval: angular velocities */
     START = 12,      /* where its initial state begins in xi */
@@ -67,7 +69,7 @@ typedef struct {
     const double *lengths;       /* of the intervals in [s] */
     double differentiation[NODES][NODES + 1], butcher[NODES][NODES], quadrature[NODES];
     double lower[ANGLES], upper[ANGLES];
-    double cone[CONES][2], cone_least[CONES], weight;
+    double cone[CONES][2], cone_least[CONES], weight, mass;
     double penalty;              /* on the state at the end, see eliminate() */
     double curvature_share;      /* of the Lagrangian's Hessian, see condense() */
     /* The iterate. */
@@ -77,15 +79,15 @@ typedef struct {
     const double *torques;       /* (nodes, 3) */
     const double *passive;       /* multipliers of the passive rows, (nodes) */
     const double *springs;       /* K, q_eq */
-    const double *slacks;        /* (nodes, 12) */
-    const double *multipliers;   /* (nodes, 12) */
+    const double *slacks;        /* (nodes, 13) */
+    const double *multipliers;   /* (nodes, 13) */
     /* Evaluated there. */
     double *y;                   /* (nodes, 16) */
     double *true_momenta;        /* (1 + nodes, 6) */
     double *momentum_jacobian;   /* (1 + nodes, 6, 8) */
     double *rows;                /* (nodes, 5) */
     double *row_jacobian;        /* (nodes, 5, 16) */
-    double *limits;              /* (nodes, 12) */
+    double *limits;              /* (nodes, 13) */
     double *rate_defect;         /* (nodes, 6) */
     double *momentum_multipliers; /* (1 + nodes, 6) */
     double *hessian;             /* (nodes, 16, 16) */

@@ -18,6 +18,7 @@ static double held_multiplier(const Step *step, int entry, double target) {
 static void point_gradient(const Step *step, int k, int i, const double *targets, double *gradient) {
     int node = NODES * k + i, first = LIMITS * node;
     const double *jacobian = step->row_jacobian + ROWS * POINT * node;
+    const double *forward = step->momentum_jacobian + MOMENTA * STATE * (node + 1);
     double share = step->lengths[k] * step->quadrature[i], held[LIMITS];
     for (int r = 0; r < LIMITS; r++) held[r] = held_multiplier(step, first + r, targets[first + r]);
     memcpy(gradient, step->defect_gradient + POINT * node, sizeof(double) * POINT);
@@ -27,6 +28,7 @@ static void point_gradient(const Step *step, int k, int i, const double *targets
         for (int a = 0; a < POINT; a++) gradient[a] += factor * jacobian[POINT * r + a];
     }
     for (int a = 0; a < ANGLES; a++) gradient[a] += held[ANGLES + a] - held[a];
+    for (int a = 0; a < STATE; a++) gradient[a] -= held[FORWARD_LIMIT] / step->mass * forward[a];
     for (int r = 0; r < CONES; r++)
         for (int a = 0; a < 2; a++) gradient[RATE + a] -= held[CONE_LIMIT + r] * step->cone[r][a];
 }
@@ -61,7 +63,7 @@ static void interval_gradient(const Step *step, int k, const double *targets, do
 }
 
 /* Returns the gradient of the value of the whole step, (18), for products of slacks and multipliers that
- * are wanted, (nodes, 12). */
+ * are wanted, (nodes, 13). */
 EXPORT void gather(Step *step, const double *targets, double *gradient) {
     memset(gradient, 0, sizeof(double) * BEHIND);
     for (int k = step->intervals - 1; k >= 0; k--) {
@@ -105,6 +107,10 @@ static void step_point(Step *step, int node, const double *change, const double 
     of_limits[GAP_LIMIT] = of_rows[GAP];
     for (int r = 0; r < CONES; r++)
         of_limits[CONE_LIMIT + r] = step->cone[r][0] * change[RATE] + step->cone[r][1] * change[RATE + 1];
+    of_limits[FORWARD_LIMIT] = 0.0;
+    for (int a = 0; a < STATE; a++)
+        of_limits[FORWARD_LIMIT] += step->momentum_jacobian[MOMENTA * STATE * (node + 1) + a] * change[a];
+    of_limits[FORWARD_LIMIT] /= step->mass;
     for (int r = 0; r < LIMITS; r++) {
         int entry = LIMITS * node + r;
         double slack = step->slacks[entry], multiplier = step->multipliers[entry];

@@ -18,7 +18,7 @@ _NUMBERS = ctypes.POINTER(ctypes.c_double)
 _GENERATED = ("momentum", "point", "curvature")
 
 # Inequalities of a node, and which of them is the gap of foot 2.
-LIMITS, GAP_LIMIT = 12, 8
+LIMITS, GAP_LIMIT = 13, 8
 # The ends of a step: the state at its start (8), K, q_eq, and the multipliers of the state at its end (8).
 ENDS = 18
 
@@ -41,6 +41,7 @@ class Step(ctypes.Structure):
         ("cone", ctypes.c_double * 6),
         ("cone_least", ctypes.c_double * 3),
         ("weight", ctypes.c_double),
+        ("mass", ctypes.c_double),
         ("penalty", ctypes.c_double),
         ("curvature_share", ctypes.c_double),
         *((name, _NUMBERS) for name in ("start", "omega", "momenta", "torques", "passive", "springs")),

@@ -55,6 +55,7 @@ static void limit_values(const Step *step, int node) {
     for (int r = 0; r < CONES; r++)
         limits[CONE_LIMIT + r] =
             step->cone[r][0] * force[0] + step->cone[r][1] * force[1] - step->cone_least[r];
+    limits[FORWARD_LIMIT] = step->true_momenta[MOMENTA * (node + 1)] / step->mass;
 }
 
 static void evaluate_momenta(Step *step, int begin, int end) {
@@ -126,14 +127,14 @@ static void find_momentum_multipliers(Step *step) {
 }
 
 static void evaluate_hessians(Step *step, int begin, int end) {
-    double work[step->curvature_work + 1], multipliers[ROWS];
+    double work[step->curvature_work + 1], multipliers[ROWS], of_momenta[MOMENTA];
     for (int k = begin; k < end; k++) {
         for (int i = 0; i < NODES; i++) {
             int node = NODES * k + i;
             row_multipliers(step, k, i, multipliers);
-            const double *arguments[] = {
-                step->y + POINT * node, multipliers, step->momentum_multipliers + MOMENTA * (node + 1),
-                step->walker};
+            memcpy(of_momenta, step->momentum_multipliers + MOMENTA * (node + 1), sizeof of_momenta);
+            of_momenta[0] -= step->multipliers[LIMITS * node + FORWARD_LIMIT] / step->mass;
+            const double *arguments[] = {step->y + POINT * node, multipliers, of_momenta, step->walker};
             double *results[] = {step->hessian + POINT * POINT * node};
             step->curvature(arguments, results, NULL, work, 0);
         }

@@ -126,7 +126,7 @@ class CondensedStep:
     def _set_constants(self, walker: WalkerParameters, intervals: int, threads: int) -> None:
         step = self._step
         step.intervals, step.threads, step.penalty = intervals, threads, PENALTY
-        step.weight = walker.weight
+        step.weight, step.mass = walker.weight, walker.total_mass
         step.differentiation[:] = DIFFERENTIATION.ravel().tolist()
         step.butcher[:] = BUTCHER.ravel().tolist()
         step.quadrature[:] = QUADRATURE.tolist()
@@ -154,7 +154,7 @@ class CondensedStep:
 
     @property
     def limits(self) -> FloatArray:
-        """The inequalities of the nodes, (3 n, 12), not negative where they hold."""
+        """The inequalities of the nodes, (3 n, 13), not negative where they hold."""
         return self._memory["limits"]
 
     @property
