@@ -27,6 +27,9 @@ _GAP = 1e-6
 _INFEASIBILITY = 1e-6
 # Largest change of an angular velocity in [rad/s] by the last step.
 _LAST_STEP = 1e-2
+# Products stay this part of the objective above zero for each unit of infeasibility: iterates that are on
+# their bounds before they meet the equations come to a halt.
+_PRODUCTS_FOR_INFEASIBILITY = 0.1
 # No first slack is smaller, in natural units.
 _LEAST_SLACK = 1e-3
 _TO_THE_BOUNDARY = 0.995
@@ -77,7 +80,7 @@ class InteriorPoint:
         step.evaluate(settle=True)
         ends.evaluate(step)
         self._slacks, self._multipliers = self._of("slacks"), self._of("multipliers")
-        scale = step.objective() / int(self._used.sum())
+        self._scale = scale = step.objective() / int(self._used.sum())
         self._least_product = 0.3 * _GAP * scale
         self._slacks[:] = np.where(self._used, np.maximum(self._limits(), _LEAST_SLACK), 1.0)
         self._multipliers[:] = np.where(self._used, _FIRST_BARRIER * scale / self._slacks, 0.0)
@@ -144,7 +147,8 @@ class InteriorPoint:
         )
         product = self._product()
         centring = (float(ahead) / int(self._used.sum()) / product) ** 3
-        target = max(centring * product, self._least_product)
+        floor = min(product, _PRODUCTS_FOR_INFEASIBILITY * self._scale * self._infeasibility())
+        target = max(centring * product, self._least_product, floor)
         # The part of second order belongs to a full step: a shorter one takes less of it [Colombo2008].
         targets = target - affine.primal * affine.dual * of_slacks * of_multipliers
         best = self._direction(joined, targets, _TO_THE_BOUNDARY)
