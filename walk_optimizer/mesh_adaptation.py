@@ -72,7 +72,7 @@ def torque_saved(
 ) -> float:
     """Return which part of the objective a solution saves by leaving its bounds between the nodes.
 
-    That is how far it leaves them, times the multipliers of the bounds at the nodes of the interval.
+    It is an estimate: how far each interval leaves them, times the multipliers at its own nodes.
 
     Args:
         walker: The walker.

@@ -144,6 +144,7 @@ class RefinedSolves:
             session: Clock, cancelling and progress.
         """
         self.request, self.walker, self.session = request, walker, session
+        self._condenses = session.condenses
 
     def adapted(self, solution: RefinedSolution) -> RefinedSolution:
         """Return a solution on a mesh that is divided until its error is small, or whatever fails there."""
@@ -182,7 +183,7 @@ class RefinedSolves:
             mesh: Phases and intervals.
             points: First guess.
         """
-        if self.session.condenses and is_single_support(mesh.phases) and not self.session.stopped:
+        if self._condenses and is_single_support(mesh.phases):
             monitor = self.session.monitor(_STAGE, self._objective_unit)
             lengths = mesh.lengths(points.durations)
             found = solve_condensed(self.request, self.walker, lengths, points, monitor)
@@ -190,6 +191,9 @@ class RefinedSolves:
             if found.points is not None:
                 trajectory, spring = trajectory_on(mesh, found.points), found.points.spring
                 return RefinedSolution(found.status, mesh, trajectory, spring, prices=found.prices)
+            if self.session.stopped:
+                return RefinedSolution(found.status, mesh, None, points.spring)
+            self._condenses = False  # nor would it come to an end on finer meshes
         return self.solved(mesh, points)
 
     @property

@@ -2,7 +2,7 @@
 
 The neighbours are interpolated on the finer one's mesh, which is close enough to the new optimum for a
 few iterations, and mostly for the mesh to be fine enough: it is divided only if the certificate fails, or
-if too much torque is saved where bounds are left between the nodes.
+if prices are known and tell that much torque is saved where bounds are left between the nodes.
 """
 
 from collections.abc import Sequence
@@ -57,17 +57,18 @@ def resolve(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSess
     walker = neighbours[0].walker
     solves = RefinedSolves(request, walker, session)
     solution = solves.solved_nearby(mesh, guess)
-    fine = _is_fine_enough(walker, request, solution)
-    gait = certified_refinement(walker, request, solution) if fine else None
-    return gait or solves.certified(solves.adapted(solution))
+    gait = certified_refinement(walker, request, solution)
+    if gait is not None and not _saves_too_much(walker, request, solution):
+        return gait
+    return solves.certified(solves.adapted(solution)) or gait
 
 
-def _is_fine_enough(walker: WalkerParameters, request: GaitRequest, solution: RefinedSolution) -> bool:
-    """Return whether a solution on a neighbour's mesh has about the objective of a finer one."""
+def _saves_too_much(walker: WalkerParameters, request: GaitRequest, solution: RefinedSolution) -> bool:
+    """Return whether a solution on a neighbour's mesh is known to leave its bounds at a profit."""
     if solution.trajectory is None or solution.prices is None:
         return False
     saved = torque_saved(walker, request.step_length, solution.trajectory, solution.prices)
-    return saved <= _MOST_SAVED
+    return saved > _MOST_SAVED
 
 
 def continued(request: GaitRequest, neighbours: Sequence[Gait], session: SolveSession) -> RefinedGait | None:

@@ -16,6 +16,8 @@ from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.resolve import mesh_of
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
 
+needs_compiler = pytest.mark.skipif(kernel() is None, reason="no C compiler")
+
 
 @dataclass(frozen=True, eq=False)
 class Start:
@@ -36,7 +38,7 @@ class Start:
         unknowns = Unknowns(self.lengths.size, len(ends.equations), ends.size)
         length = gait.request.step_length
         step = CondensedStep(kernel(), gait.walker, length, self.lengths, unknowns, threads)
-        begin(step, gait.walker, self.points)
+        begin(step, ends, gait.walker, self.points)
         return step, ends
 
 

@@ -1,5 +1,7 @@
 """The condensed functions against mechanics written a second time, and against finite differences."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,12 @@ from walk_optimizer.transcription.scaling import spring_units, torque_unit
 
 SPRING = KneeSpring(stiffness=60.0, equilibrium=2.7)
 STEP = 0.4
-RNG = np.random.default_rng(7)
+
+
+@pytest.fixture(autouse=True)
+def rng():
+    """Numbers that do not depend on which tests ran before."""
+    return np.random.default_rng(7)
 
 
 @pytest.fixture(params=[Terrain(), Terrain(slope=0.08)], ids=["level", "slope"])
@@ -19,6 +26,7 @@ def walker(request):
     return WalkerParameters(hip_mass=40.0, lower_leg_length=0.45, terrain=request.param)
 
 
+@cache
 def functions():
     return {one.name(): one for one in [*node_functions(), *end_functions(), *hip_functions()]}
 
@@ -33,13 +41,13 @@ def full_state(walker, theta, omega):
     return q, qdot, np.linalg.solve(unit, qdot)
 
 
-def random_motion():
-    theta = np.array([0.2, 2.9, -0.3, 2.5]) + 0.1 * RNG.standard_normal(4)
-    return theta, RNG.standard_normal(4)
+def random_motion(rng):
+    theta = np.array([0.2, 2.9, -0.3, 2.5]) + 0.1 * rng.standard_normal(4)
+    return theta, rng.standard_normal(4)
 
 
-def test_the_hip_is_where_foot_1_stands_at_the_origin_and_does_not_move(walker):
-    theta, omega = random_motion()
+def test_the_hip_is_where_foot_1_stands_at_the_origin_and_does_not_move(walker, rng):
+    theta, omega = random_motion(rng)
     q, qdot, p = full_state(walker, theta, omega)
     state = mechanics_at(walker, SPRING, q[:, None], p[:, None])
     np.testing.assert_allclose(foot_arm(walker, q[:, None], 0).position, 0.0, atol=1e-15)
@@ -47,16 +55,16 @@ def test_the_hip_is_where_foot_1_stands_at_the_origin_and_does_not_move(walker):
     np.testing.assert_allclose(state.qdot[:, 0], qdot, atol=1e-12)
 
 
-def test_momenta_are_those_of_the_mechanics(walker):
-    theta, omega = random_motion()
+def test_momenta_are_those_of_the_mechanics(walker, rng):
+    theta, omega = random_motion(rng)
     value, _ = functions()["condensed_momentum"](np.concatenate([theta, omega]), walker.vector(STEP))
     np.testing.assert_allclose(np.asarray(value).ravel(), full_state(walker, theta, omega)[2], rtol=1e-10)
 
 
-def test_rows_of_a_node_are_the_torques_that_the_rate_of_the_momenta_needs(walker):
-    theta, omega = random_motion()
+def test_rows_of_a_node_are_the_torques_that_the_rate_of_the_momenta_needs(walker, rng):
+    theta, omega = random_motion(rng)
     q, _, p = full_state(walker, theta, omega)
-    torques, reaction = RNG.standard_normal(3) * 20, np.array([30.0, 700.0])
+    torques, reaction = rng.standard_normal(3) * 20, np.array([30.0, 700.0])
     mechanics = mechanics_at(walker, SPRING, q[:, None], p[:, None])
     forces = np.concatenate([reaction, np.zeros(2)])[:, None]
     rate = mechanics.momentum_rate(torques[:, None], forces)[:, 0]
@@ -70,8 +78,8 @@ def test_rows_of_a_node_are_the_torques_that_the_rate_of_the_momenta_needs(walke
     assert rows[4] * walker.leg_length == pytest.approx(gap, abs=1e-12)
 
 
-def test_the_ends_are_zero_for_an_impact_of_the_mechanics(walker):
-    theta, omega = random_motion()
+def test_the_ends_are_zero_for_an_impact_of_the_mechanics(walker, rng):
+    theta, omega = random_motion(rng)
     _, _, before = full_state(walker, theta, omega)
     exchanged = theta[[2, 3, 0, 1]]
     # A velocity after the impact, and the impulse that leads there.
@@ -104,11 +112,11 @@ def impact_equations(walker, theta, before):
 
 
 @pytest.mark.parametrize("name", ["condensed_point", "condensed_momentum", "condensed_ends"])
-def test_first_derivatives_are_those_of_finite_differences(walker, name):
+def test_first_derivatives_are_those_of_finite_differences(walker, rng, name):
     function, vector = functions()[name], walker.vector(STEP)
-    theta, omega = random_motion()
+    theta, omega = random_motion(rng)
     size = function.size1_in(0)
-    x = np.concatenate([theta, omega, RNG.standard_normal(8)])[:size]
+    x = np.concatenate([theta, omega, rng.standard_normal(8)])[:size]
     derivative = np.asarray(function(x, vector)[1])
     jacobian = derivative if name == "condensed_ends" else derivative.T
     differences = [
@@ -119,12 +127,12 @@ def test_first_derivatives_are_those_of_finite_differences(walker, name):
 
 
 @pytest.mark.parametrize("name", ["curvature", "ends_curvature"])
-def test_second_derivatives_are_those_of_finite_differences(walker, name):
+def test_second_derivatives_are_those_of_finite_differences(walker, rng, name):
     every, vector = functions(), walker.vector(STEP)
-    theta, omega = random_motion()
+    theta, omega = random_motion(rng)
     if name == "curvature":
-        x = np.concatenate([theta, omega, RNG.standard_normal(6), [3.0, 2.8]])
-        of_rows, of_momenta = RNG.standard_normal(5), RNG.standard_normal(6)
+        x = np.concatenate([theta, omega, rng.standard_normal(6), [3.0, 2.8]])
+        of_rows, of_momenta = rng.standard_normal(5), rng.standard_normal(6)
 
         def gradient(at):
             rows = np.asarray(every["condensed_point"](at, vector)[1]) @ of_rows
@@ -133,7 +141,7 @@ def test_second_derivatives_are_those_of_finite_differences(walker, name):
 
         hessian = np.asarray(every["condensed_curvature"](x, of_rows, of_momenta, vector))
     else:
-        x, lam = np.concatenate([theta, omega, RNG.standard_normal(4)]), RNG.standard_normal(9)
+        x, lam = np.concatenate([theta, omega, rng.standard_normal(4)]), rng.standard_normal(9)
 
         def gradient(at):
             return np.asarray(every["condensed_ends"](at, vector)[1]).T @ lam

@@ -1,11 +1,10 @@
 """Condensed solves find what IPOPT finds on the same mesh, and give up where they don't."""
 
-import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from condensed.conftest import start_of
+from condensed.conftest import needs_compiler, start_of
 
 from walk_optimizer.condensed import interior_point, solve
 from walk_optimizer.condensed.solve import solve_condensed
@@ -13,6 +12,7 @@ from walk_optimizer.gait import Certificate, RefinedGait
 from walk_optimizer.mechanics import foot_2_ahead
 from walk_optimizer.mesh_adaptation import resampled, torque_saved, trajectory_on
 from walk_optimizer.model.parameters import WalkerParameters
+from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.optimizer import optimize
 from walk_optimizer.refined_certificate import certify_refined
 from walk_optimizer.refinement import RefinedSolves
@@ -22,8 +22,6 @@ from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription.mesh import even_mesh
-
-needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 
 
 def session():
@@ -113,16 +111,85 @@ def test_values_that_are_no_numbers_end_it(start):
     assert found.points is None
 
 
+@pytest.fixture
+def by_ipopt(monkeypatch):
+    """Which meshes IPOPT solves on."""
+    meshes, original = [], RefinedSolves.solved
+
+    def counted(self, mesh, *arguments):
+        meshes.append(mesh)
+        return original(self, mesh, *arguments)
+
+    monkeypatch.setattr(RefinedSolves, "solved", counted)
+    return meshes
+
+
 @pytest.mark.parametrize("lost", ["iterations", "compiler"])
-def test_ipopt_takes_over_where_it_does_not_come_to_an_end(monkeypatch, library, lost):
+def test_ipopt_takes_over_where_it_does_not_come_to_an_end(monkeypatch, library, by_ipopt, lost):
     if lost == "iterations":
         monkeypatch.setattr(interior_point, "_MOST_ITERATIONS", 2)
     else:
         monkeypatch.setattr(solve, "kernel", lambda: None)
     start = start_of(library, 0.53, "none")
-    request = GaitRequest.for_speed(0.54, "none")
-    gait = resolve(request, [start.gait], session())
+    gait = resolve(GaitRequest.for_speed(0.54, "none"), [start.gait], session())
     assert gait.certificate.certified
+    assert by_ipopt
+
+
+@needs_compiler
+def test_ipopt_does_not_take_over_from_a_solve_that_was_cancelled(library, by_ipopt):
+    start = start_of(library, 0.53, "stiffness")
+    told = []
+
+    def progress(one):
+        told.append(one)
+        return len(told) < 3
+
+    asked = SolveSession(solver_settings(), 300.0, progress)
+    assert resolve(GaitRequest.for_speed(0.54, "stiffness"), [start.gait], asked) is None
+    assert asked.verdict is Status.CANCELLED
+    assert len(told) == 3
+    assert not by_ipopt
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("mode", "wanted"),
+    [
+        ("stiffness_and_equilibrium", "none"),
+        ("stiffness_and_equilibrium", "stiffness"),
+        ("stiffness", "none"),
+    ],
+)
+def test_springs_that_a_mode_fixes_are_at_their_values(library, mode, wanted):
+    """A neighbour with richer springs is a start for a mode that does not have them."""
+    start = start_of(library, 0.53, mode)
+    found = condensed(start, GaitRequest.for_speed(0.54, wanted))
+    if found.points is not None:
+        assert found.points.spring.equilibrium == pytest.approx(np.pi, abs=1e-12)
+        assert found.points.spring.stiffness == 0.0 or wanted == "stiffness"
+    gait = resolve(GaitRequest.for_speed(0.54, wanted), [start.gait], session())
+    assert gait.certificate.certified
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "change",
+    [{"friction_coefficient": 0.12}, {"terrain": Terrain(slope=-0.01)}, {"terrain": Terrain(step_up=0.005)}],
+    ids=["slippery", "downhill", "upstairs"],
+)
+def test_other_walkers_get_ipopts_solution_too(library, change):
+    start = start_of(library, 0.53, "stiffness")
+    walker, request = replace(start.gait.walker, **change), start.gait.request
+    found = condensed(start, request, walker)
+    assert found.status is Status.SOLVED
+    theirs = RefinedSolves(request, walker, session()).solved(start.mesh, found.points)
+    effort = trajectory_on(start.mesh, found.points).torque_effort
+    assert effort == pytest.approx(theirs.effort, rel=1e-4)
+    assert effort != pytest.approx(start.gait.refined.trajectory.torque_effort, rel=1e-3), "nothing changes"
+    entries = certificate_of(walker, request, start, found.points).entries
+    broken = {entry.family for entry in entries if not entry.violation <= entry.tolerance}
+    assert not broken & {"friction_cone", "impact_cone", "impact", "landing", "tread", "penetration"}
 
 
 @needs_compiler
@@ -140,10 +207,10 @@ def test_prices_tell_what_leaving_bounds_between_the_nodes_saves(library, speed)
     assert saved == pytest.approx(actual, rel=0.5)
 
 
-@needs_compiler
 def test_another_back_end_is_not_bypassed(monkeypatch, library):
     monkeypatch.setattr("walk_optimizer.refinement.solve_condensed", lambda *_: pytest.fail("it was"))
+    monkeypatch.setattr(RefinedSolves, "solved", lambda _, mesh, points: (mesh, points))
     settings = replace(solver_settings(), back_end="uno")
     start = start_of(library, 0.53, "none")
-    solves = RefinedSolves(start.gait.request, start.gait.walker, SolveSession(settings, 0.5, None))
-    solves.solved_nearby(start.mesh, start.points)
+    solves = RefinedSolves(start.gait.request, start.gait.walker, SolveSession(settings, 300.0, None))
+    assert solves.solved_nearby(start.mesh, start.points) == (start.mesh, start.points)

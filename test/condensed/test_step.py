@@ -1,16 +1,14 @@
 """The condensed linear algebra against dense linear algebra, and what a Newton direction promises."""
 
-import shutil
-
 import numpy as np
-import pytest
+from condensed.conftest import needs_compiler
 
 from walk_optimizer.condensed.step import BUTCHER, PENALTY
 
 # Of the barrier: multipliers over slacks.
 WEIGHT = 1e-2
 
-pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+pytestmark = needs_compiler
 
 
 def disturbed(start, size, threads=1):

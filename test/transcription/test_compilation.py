@@ -118,6 +118,20 @@ def test_a_damaged_note_is_written_anew(damage):
 
 
 @needs_compiler
+def test_machine_code_is_the_library_only_where_that_is_used(compiler, monkeypatch):
+    monkeypatch.setattr(compilation, "compiled", compiled_anew)
+    compiler(f'exec {COMPILER} "$@"')
+    library = compilation.machine_code(tiny)
+    assert [library] == libraries()
+    # A library that is damaged and can't be compiled again: the note still names it.
+    library.unlink()
+    compiler("exit 1")
+    assert compilation.machine_code(tiny) is None
+    monkeypatch.setenv(COMPILER_VARIABLE, "")
+    assert compilation.machine_code(tiny) is None
+
+
+@needs_compiler
 def test_other_sources_are_built_anew(tmp_path, monkeypatch):
     builds.clear()
     compiled_anew(power, 2)

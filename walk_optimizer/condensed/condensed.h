@@ -45,7 +45,7 @@ enum {
     BEHIND_PADDED = 24
 };
 
-/* A function that CasADi made. */
+/* A function that CasADi made of scalar expressions: it needs no work space. */
 typedef int (*Generated)(const double **arguments, double **results, long long *iw, double *w, int memory);
 
 /* What is kept of an interval's elimination. */
@@ -64,7 +64,6 @@ typedef struct {
 typedef struct {
     int intervals, threads;
     Generated momentum, point, curvature;
-    int momentum_work, point_work, curvature_work; /* lengths of w */
     const double *walker;        /* parameters of the generated functions */
     const double *lengths;       /* of the intervals in [s] */
     double differentiation[NODES][NODES + 1], butcher[NODES][NODES], quadrature[NODES];

@@ -43,7 +43,8 @@ class Ends:
         inequalities: Which are inequalities.
         free_springs: Which of K and q_eq may be chosen, (2,).
         used: Which of the inequalities and bounds there are: those of fixed springs take no part.
-        rows: Values of the equations at the iterate.
+        point: theta and omega at the end, omega after the impact of the iterate, (12,).
+        rows: Values of the equations there.
         limits: Values of the inequalities, then distances of the springs from their bounds.
     """
 
@@ -67,6 +68,13 @@ class Ends:
         self.free_springs = self._upper > self._lower
         rows = np.ones(len(self.inequalities), dtype=bool)
         self.used = np.concatenate([rows, self.free_springs, self.free_springs])
+        self.point, self.rows = np.zeros(3 * ANGLES), np.zeros(len(self.equations))
+        self.limits, self._jacobian = np.zeros(self.used.size), np.zeros((END_ROWS, 3 * ANGLES))
+        self._hessian = np.zeros((3 * ANGLES, 3 * ANGLES))
+
+    def bounded(self, springs: FloatArray) -> FloatArray:
+        """Return K and q_eq, scaled, within their bounds."""
+        return np.clip(springs, self._lower, self._upper)
 
     @property
     def size(self) -> int:

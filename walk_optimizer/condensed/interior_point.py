@@ -1,7 +1,7 @@
 """A primal-dual interior-point method for condensed steps, made for starts near a solution.
 
 Mehrotra's predictor and corrector [Mehrotra1992], with Gondzio's centrality correctors [Gondzio1996]: a
-direction costs a twentieth of a factorisation here, so several are made of each. There is no line search.
+direction costs an eighth of a factorisation here, so several are made of each. There is no line search.
 A start that is too far away shows in iterations that do not end, and another method has to take it.
 """
 
@@ -19,13 +19,17 @@ from walk_optimizer.solve.status import Status
 FloatArray = NDArray[np.float64]
 
 _MOST_ITERATIONS = 40
+# After so many without a smaller infeasibility the start is taken for too far away.
+_MOST_IN_VAIN = 12
 # First products of slacks and multipliers add up to so many times the objective.
 _FIRST_BARRIER = 3.0
 # They add up to this part of it at the end: what the objective may be above the optimum.
 _GAP = 1e-6
+# No product is wanted smaller than this part of the objective for each inequality.
+_LEAST_PRODUCT = 3e-7
 # Largest violation of an equation, in natural units.
 _INFEASIBILITY = 1e-6
-# Largest change of an angular velocity in [rad/s] by the last step.
+# Largest change of an angular velocity in [rad/s], and of K and q_eq in their units, by the last step.
 _LAST_STEP = 1e-2
 # Products stay this part of the objective above zero for each unit of infeasibility: iterates that are on
 # their bounds before they meet the equations come to a halt.
@@ -80,11 +84,9 @@ class InteriorPoint:
         step.evaluate(settle=True)
         ends.evaluate(step)
         self._slacks, self._multipliers = self._of("slacks"), self._of("multipliers")
-        self._scale = scale = step.objective() / int(self._used.sum())
-        self._least_product = 0.3 * _GAP * scale
         self._slacks[:] = np.where(self._used, np.maximum(self._limits(), _LEAST_SLACK), 1.0)
-        self._multipliers[:] = np.where(self._used, _FIRST_BARRIER * scale / self._slacks, 0.0)
-        self._gap = _GAP * scale
+        self._multipliers[:] = np.where(self._used, _FIRST_BARRIER * self._share() / self._slacks, 0.0)
+        self._infeasibility = self._largest_violation()
 
     def solve(self, monitor: Monitor) -> tuple[Status, int]:
         """Iterate to the optimum and return how that ended, and after how many iterations.
@@ -92,21 +94,23 @@ class InteriorPoint:
         Args:
             monitor: Told at each iteration.
         """
+        least, in_vain = np.inf, 0
         for iteration in range(_MOST_ITERATIONS):
-            infeasibility = self._infeasibility()
-            if not np.isfinite(infeasibility):
+            if not np.isfinite(self._infeasibility):
                 return Status.EVALUATION_ERROR, iteration
-            verdict = monitor(IterationState(iteration, self._step.objective(), infeasibility))
+            verdict = monitor(IterationState(iteration, self._step.objective(), self._infeasibility))
             if verdict is not None:
                 return verdict, iteration
+            in_vain = 0 if self._infeasibility < least else in_vain + 1
+            least = min(least, self._infeasibility)
+            if in_vain > _MOST_IN_VAIN:
+                return Status.ITERATION_LIMIT, iteration
             joined = self._factored(_CURVATURES if iteration else _FIRST_CURVATURES)
             if joined is None:
                 return Status.SOLVER_ERROR, iteration
             direction = self._best_direction(joined)
-            last = float(np.abs(self._step.unknowns.of(direction.change, "omega")).max())
             self._move(direction)
-            done = self._infeasibility() < _INFEASIBILITY and self._product() < self._gap
-            if done and last < _LAST_STEP:
+            if self._is_done(direction):
                 return Status.SOLVED, iteration + 1
         return Status.ITERATION_LIMIT, _MOST_ITERATIONS
 
@@ -116,7 +120,16 @@ class InteriorPoint:
     def _limits(self) -> FloatArray:
         return np.concatenate([self._step.limits.ravel(), self._ends.limits])
 
-    def _infeasibility(self) -> float:
+    def _share(self) -> float:
+        """Return the objective for each inequality."""
+        return self._step.objective() / int(self._used.sum())
+
+    def _is_done(self, last: _Direction) -> bool:
+        moved = [np.abs(self._step.unknowns.of(last.change, name)).max() for name in ("omega", "springs")]
+        small = self._infeasibility < _INFEASIBILITY and self._product() < _GAP * self._share()
+        return bool(small and max(moved) < _LAST_STEP)
+
+    def _largest_violation(self) -> float:
         of_limits = np.abs(self._limits() - self._slacks)[self._used].max()
         return float(np.max([self._step.infeasibility(), np.abs(self._ends.rows).max(), of_limits]))
 
@@ -141,14 +154,14 @@ class InteriorPoint:
     def _best_direction(self, joined: JoinedEnds) -> _Direction:
         """Return the direction of predictor and correctors."""
         affine = self._direction(joined, np.zeros(self._slacks.size), 1.0)
-        of_slacks, of_multipliers = self._changes(affine)
+        of_slacks, of_multipliers = self._changes(affine.change)
         ahead = (self._slacks + affine.primal * of_slacks) @ (
             self._multipliers + affine.dual * of_multipliers
         )
         product = self._product()
         centring = (float(ahead) / int(self._used.sum()) / product) ** 3
-        floor = min(product, _PRODUCTS_FOR_INFEASIBILITY * self._scale * self._infeasibility())
-        target = max(centring * product, self._least_product, floor)
+        floor = min(product, _PRODUCTS_FOR_INFEASIBILITY * self._share() * self._infeasibility)
+        target = max(centring * product, _LEAST_PRODUCT * self._share(), floor)
         # The part of second order belongs to a full step: a shorter one takes less of it [Colombo2008].
         targets = target - affine.primal * affine.dual * of_slacks * of_multipliers
         best = self._direction(joined, targets, _TO_THE_BOUNDARY)
@@ -162,7 +175,7 @@ class InteriorPoint:
 
     def _correction(self, direction: _Direction, target: float) -> FloatArray:
         """Return what brings products that a longer step would leave behind nearer to the target."""
-        of_slacks, of_multipliers = self._changes(direction)
+        of_slacks, of_multipliers = self._changes(direction.change)
         primal, dual = (min(1.0, one + _TRIED_LONGER) for one in (direction.primal, direction.dual))
         products = (self._slacks + primal * of_slacks) * (self._multipliers + dual * of_multipliers)
         wanted = np.clip(products, _SMALLEST * target, _LARGEST * target)
@@ -178,7 +191,7 @@ class InteriorPoint:
         ends, joints, change = joined.solved(step.gathered(targets), held)
         step.spread(ends, targets)
         direction = step.direction.copy()
-        of_slacks, of_multipliers = self._changes_in(direction)
+        of_slacks, of_multipliers = self._changes(direction)
         of_slacks[of_ends] = excess + change
         of_multipliers[of_ends] = (targets[of_ends] - multipliers * of_slacks[of_ends]) / slacks - multipliers
         of_slacks[~self._used] = of_multipliers[~self._used] = 0.0
@@ -190,10 +203,7 @@ class InteriorPoint:
         primal = _longest(self._slacks, of_slacks, to_the_boundary)
         return _Direction(direction, primal, _longest(self._multipliers, of_multipliers, to_the_boundary))
 
-    def _changes(self, direction: _Direction) -> tuple[FloatArray, FloatArray]:
-        return self._changes_in(direction.change)
-
-    def _changes_in(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _changes(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
         unknowns = self._step.unknowns
         return unknowns.of(vector, "slacks"), unknowns.of(vector, "multipliers")
 
@@ -203,6 +213,7 @@ class InteriorPoint:
         iterate[unknowns.dual] += direction.dual * direction.change[unknowns.dual]
         self._step.evaluate()
         self._ends.evaluate(self._step)
+        self._infeasibility = self._largest_violation()
 
 
 def _longest(values: FloatArray, changes: FloatArray, to_the_boundary: float) -> float:

@@ -30,7 +30,6 @@ class Step(ctypes.Structure):
         ("intervals", ctypes.c_int),
         ("threads", ctypes.c_int),
         *((name, ctypes.c_void_p) for name in _GENERATED),
-        *((f"{name}_work", ctypes.c_int) for name in _GENERATED),
         ("walker", _NUMBERS),
         ("lengths", _NUMBERS),
         ("differentiation", ctypes.c_double * 12),
@@ -60,6 +59,8 @@ class Kernel:
 
     Attributes:
         code: Its functions, each of which takes a `Step` first.
+        generated: The functions that CasADi made.
+        elimination_numbers: Numbers of 8 bytes that the elimination of an interval takes.
     """
 
     def __init__(self, library: Path, generated: Path) -> None:
@@ -69,7 +70,7 @@ class Kernel:
             OSError: one of them can't be loaded.
         """
         self.code = ctypes.CDLL(str(library))
-        self._generated = ctypes.CDLL(str(generated))
+        self.generated = ctypes.CDLL(str(generated))
         self.code.condense.argtypes = [ctypes.POINTER(Step), ctypes.c_double]
         size = ctypes.c_int.in_dll(self.code, "elimination_bytes").value
         self.elimination_numbers = -(-size // 8)
@@ -77,11 +78,8 @@ class Kernel:
     def connect(self, step: Step) -> None:
         """Set the functions that CasADi made in a step."""
         for name in _GENERATED:
-            function = getattr(self._generated, f"condensed_{name}")
-            sizes = [ctypes.c_longlong() for _ in range(4)]
-            getattr(self._generated, f"condensed_{name}_work")(*map(ctypes.byref, sizes))
+            function = getattr(self.generated, f"condensed_{name}")
             setattr(step, name, ctypes.cast(function, ctypes.c_void_p))
-            setattr(step, f"{name}_work", sizes[3].value)
 
 
 @cache

@@ -6,11 +6,10 @@
 #define EXPORT __attribute__((visibility("default")))
 
 static void evaluate_momentum(Step *step, const double *state, int node) {
-    double work[step->momentum_work + 1];
     const double *arguments[] = {state, step->walker};
     double *results[] = {
         step->true_momenta + MOMENTA * node, step->momentum_jacobian + MOMENTA * STATE * node};
-    step->momentum(arguments, results, NULL, work, 0);
+    step->momentum(arguments, results, NULL, NULL, 0);
 }
 
 /* theta_i = theta_0 + h sum_j A_ij omega_j; theta at the end of the interval is its last. */
@@ -64,7 +63,6 @@ static void evaluate_momenta(Step *step, int begin, int end) {
 }
 
 static void evaluate_rows(Step *step, int begin, int end) {
-    double work[step->point_work + 1];
     for (int k = begin; k < end; k++) {
         for (int i = 0; i < NODES; i++) {
             int node = NODES * k + i;
@@ -75,7 +73,7 @@ static void evaluate_rows(Step *step, int begin, int end) {
                 step->rate_defect[MOMENTA * node + m] = at_true[m] - y[RATE + m];
             const double *arguments[] = {y, step->walker};
             double *results[] = {step->rows + ROWS * node, step->row_jacobian + ROWS * POINT * node};
-            step->point(arguments, results, NULL, work, 0);
+            step->point(arguments, results, NULL, NULL, 0);
             limit_values(step, node);
         }
     }
@@ -127,7 +125,7 @@ static void find_momentum_multipliers(Step *step) {
 }
 
 static void evaluate_hessians(Step *step, int begin, int end) {
-    double work[step->curvature_work + 1], multipliers[ROWS], of_momenta[MOMENTA];
+    double multipliers[ROWS], of_momenta[MOMENTA];
     for (int k = begin; k < end; k++) {
         for (int i = 0; i < NODES; i++) {
             int node = NODES * k + i;
@@ -136,20 +134,20 @@ static void evaluate_hessians(Step *step, int begin, int end) {
             of_momenta[0] -= step->multipliers[LIMITS * node + FORWARD_LIMIT] / step->mass;
             const double *arguments[] = {step->y + POINT * node, multipliers, of_momenta, step->walker};
             double *results[] = {step->hessian + POINT * POINT * node};
-            step->curvature(arguments, results, NULL, work, 0);
+            step->curvature(arguments, results, NULL, NULL, 0);
         }
     }
 }
 
 /* Evaluates the Hessians of the Lagrangian, after evaluate_points(). */
 EXPORT void evaluate_curvature(Step *step) {
-    double work[step->curvature_work + 1], y[POINT] = {0.0}, none[ROWS] = {0.0}, whole[POINT * POINT];
+    double y[POINT] = {0.0}, none[ROWS] = {0.0}, whole[POINT * POINT];
     find_momentum_multipliers(step);
     for_all_intervals(step, evaluate_hessians);
     memcpy(y, step->start, sizeof(double) * STATE);
     const double *arguments[] = {y, none, step->momentum_multipliers, step->walker};
     double *results[] = {whole};
-    step->curvature(arguments, results, NULL, work, 0);
+    step->curvature(arguments, results, NULL, NULL, 0);
     for (int a = 0; a < STATE; a++)
         memcpy(step->start_hessian + STATE * a, whole + POINT * a, sizeof(double) * STATE);
 }

@@ -12,7 +12,7 @@
 #define EXPORT __attribute__((visibility("default")))
 
 /* For whoever provides the memory. */
-EXPORT const int elimination_bytes = sizeof(Elimination);
+EXPORT const int elimination_bytes = sizeof(Elimination), step_bytes = sizeof(Step);
 
 typedef struct {
     double state[STATE][STATE], mixed[STATE][PARAMETERS], parameters[PARAMETERS][PARAMETERS];

@@ -22,7 +22,7 @@ from walk_optimizer.transcription.tableau import DIFFERENTIATION, STAGES, STATE_
 
 FloatArray = NDArray[np.float64]
 
-_ANGLE_ROWS = slice(2, 6)
+_ANGLE_ROWS, _FORWARD_ROW = slice(2, 6), 6
 _MOST_THREADS = 2
 
 
@@ -53,7 +53,8 @@ def solve_condensed(
 ) -> CondensedSolution:
     """Return the solution near a guess; without a C compiler there is none.
 
-    It solves the same equations as the refined problem of single support, to the same solution.
+    It solves the equations of the refined problem of single support. Only the gap of foot 2 is measured from
+    a stance foot at the origin, and not from one that drifts by the error of the collocation.
 
     Args:
         request: Speed, step and spring mode.
@@ -69,15 +70,20 @@ def solve_condensed(
     unknowns = Unknowns(lengths.size, len(ends.equations), ends.size)
     threads = min(_MOST_THREADS, free_processors())
     step = CondensedStep(code, walker, request.step_length, lengths, unknowns, threads)
-    begin(step, walker, guess)
+    begin(step, ends, walker, guess)
     status, iterations = InteriorPoint(step, ends).solve(monitor)
     if status is not Status.SOLVED:
         return CondensedSolution(status, iterations)
-    return CondensedSolution(status, iterations, _solution(step, ends, walker), _prices(step, walker))
+    points = _solution(step, ends, walker)
+    if points.states[0, 0, _FORWARD_ROW] < 0 or points.impulses[0, 1] < 0:
+        # The only bounds of the refined problem that are no inequalities here: no gait is known that
+        # reaches them.
+        return CondensedSolution(Status.SOLVER_ERROR, iterations)
+    return CondensedSolution(status, iterations, points, _prices(step, walker))
 
 
-def begin(step: CondensedStep, walker: WalkerParameters, guess: RefinedPoints) -> None:
-    """Set the iterate to a guess, its angles closed to a cycle."""
+def begin(step: CondensedStep, ends: Ends, walker: WalkerParameters, guess: RefinedPoints) -> None:
+    """Set the iterate to a guess, its angles closed to a cycle, its springs within their bounds."""
     angles, lengths = guess.states[:, :, _ANGLE_ROWS], step.lengths
     omega = np.einsum("ij,nja->nia", DIFFERENTIATION, angles) / lengths[:, None, None]
     travelled = np.einsum("n,j,nja->a", lengths, BUTCHER[-1], omega)
@@ -88,7 +94,7 @@ def begin(step: CondensedStep, walker: WalkerParameters, guess: RefinedPoints) -
     unknowns.of(iterate, "omega")[:] = omega.reshape(-1, ANGLES)
     unknowns.of(iterate, "start")[:] = np.concatenate([first, after])
     springs = np.array([guess.spring.stiffness, guess.spring.equilibrium])
-    unknowns.of(iterate, "springs")[:] = springs / np.array(spring_units(walker), dtype=float)
+    unknowns.of(iterate, "springs")[:] = ends.bounded(springs / np.array(spring_units(walker), dtype=float))
     unknowns.of(iterate, "torques")[:] = guess.torques.reshape(-1, 3) / float(torque_unit(walker))
 
 
@@ -108,18 +114,13 @@ def _solution(step: CondensedStep, ends: Ends, walker: WalkerParameters) -> Refi
     start = step.unknowns.of(step.iterate, "start")
     angles = np.concatenate([start[None, :ANGLES], step.y[:, :ANGLES]])
     velocities = np.concatenate([start[None, ANGLES:], step.y[:, ANGLES : 2 * ANGLES]])
-    function = compiled(hip_functions)["condensed_hip"].map(len(angles))
-    hip, hip_velocity = (np.asarray(one).T for one in function(angles.T, velocities.T, step.walker_vector))
-    moved = np.einsum("n,ij,njx->nix", step.lengths, BUTCHER, hip_velocity[1:].reshape(count, STAGES, 2))
-    starts = hip[0] + np.concatenate([np.zeros((1, 2)), np.cumsum(moved[:, -1], axis=0)[:-1]])
-    places = np.concatenate([hip[:1], (starts[:, None] + moved).reshape(-1, 2)])
+    places = _hip_places(step, angles, velocities)
     states = np.concatenate([places, angles, step.true_momenta], axis=1)
     nodes = states[1:].reshape(count, STAGES, 12)
     forces = np.zeros((count, STAGES, 4))
     forces[:, :, :2] = step.y[:, 8:10].reshape(count, STAGES, 2) + np.array([0.0, walker.weight])
-    stiffness, equilibrium = step.unknowns.of(step.iterate, "springs") * np.array(
-        spring_units(walker), dtype=float
-    )
+    units = np.array(spring_units(walker), dtype=float)
+    stiffness, equilibrium = step.unknowns.of(step.iterate, "springs") * units
     return RefinedPoints(
         states=np.concatenate([states[0 : 3 * count : STAGES][:, None], nodes], axis=1),
         torques=step.rows[:, :3].reshape(count, STAGES, 3) * float(torque_unit(walker)),
@@ -128,3 +129,13 @@ def _solution(step: CondensedStep, ends: Ends, walker: WalkerParameters) -> Refi
         impulses=np.concatenate([ends.impulse(), np.zeros(2)])[None],
         spring=KneeSpring(float(stiffness), float(equilibrium)),
     )
+
+
+def _hip_places(step: CondensedStep, angles: FloatArray, velocities: FloatArray) -> FloatArray:
+    """Return where the hip is at the start and the nodes, (1 + 3 n, 2), by collocation of its velocity."""
+    count = step.lengths.size
+    function = compiled(hip_functions)["condensed_hip"].map(len(angles))
+    hip, hip_velocity = (np.asarray(one).T for one in function(angles.T, velocities.T, step.walker_vector))
+    moved = np.einsum("n,ij,njx->nix", step.lengths, BUTCHER, hip_velocity[1:].reshape(count, STAGES, 2))
+    starts = hip[0] + np.concatenate([np.zeros((1, 2)), np.cumsum(moved[:, -1], axis=0)[:-1]])
+    return np.concatenate([hip[:1], (starts[:, None] + moved).reshape(-1, 2)])

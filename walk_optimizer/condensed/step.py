@@ -78,6 +78,9 @@ class CondensedStep:
     Attributes:
         iterate: The unknowns, to be changed in place.
         direction: The last direction; of `passive` the new values.
+        unknowns: Where the unknowns stand in both.
+        walker_vector: The numbers of the walker that generated functions take.
+        lengths: Of the intervals in [s], (n,).
     """
 
     def __init__(
@@ -195,7 +198,7 @@ class CondensedStep:
     def infeasibility(self) -> float:
         """Return the largest violation of an equation of the nodes, in natural units."""
         torques = self.unknowns.of(self.iterate, "torques")
-        violations = (self.rows[:, 3], self.rows[:, :3] - torques, self._memory["rate_defect"][:, :2])
+        violations = (self.rows[:, 3], self.rows[:, :3] - torques, self._memory["rate_defect"])
         units = (1.0, 1.0, float(self._step.weight))
         return float(np.max([np.abs(one).max() / unit for one, unit in zip(violations, units, strict=True)]))
 

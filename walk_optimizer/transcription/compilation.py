@@ -62,7 +62,9 @@ def machine_code(build: Callable[..., list[ca.Function]], *arguments: Hashable) 
     compiler = find_compiler(_INTERPRETER)
     if compiler is None:
         return None
-    compiled(build, *arguments)
+    functions = compiled(build, *arguments).values()
+    if not all(function.class_name().endswith("External") for function in functions):
+        return None
     return _Note(build, arguments, compiler).library()
 
 
