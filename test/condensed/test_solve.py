@@ -65,7 +65,7 @@ def test_the_solution_is_ipopts(start):
 @pytest.mark.parametrize("margin", ["landing_speed", "stance_load"])
 def test_margins_are_kept(library, margin):
     start = start_of(library, 0.53, "stiffness")
-    walker = replace(start.gait.walker, **{margin: {"landing_speed": 0.5, "stance_load": 0.75}[margin]})
+    walker = replace(start.gait.walker, **{margin: {"landing_speed": 0.3, "stance_load": 0.7}[margin]})
     kept = {}
     for asked in (start.gait.walker, walker):
         found = condensed(start, start.gait.request, asked)
