@@ -101,6 +101,10 @@ def test_what_it_tells_is_true_and_it_ends_when_told_to(start):
     assert [state.iteration for state in told] == [0, 1, 2, 3]
     assert all(state.objective > 0 for state in told)
     assert told[3].infeasibility < told[0].infeasibility
+    told.clear()
+    found = condensed(start, request, monitor=told.append)
+    assert [state.iteration for state in told] == [*range(found.iterations + 1)]
+    assert told[-1].infeasibility < 1e-6
 
 
 @needs_compiler

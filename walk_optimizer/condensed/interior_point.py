@@ -86,33 +86,32 @@ class InteriorPoint:
         self._slacks, self._multipliers = self._of("slacks"), self._of("multipliers")
         self._slacks[:] = np.where(self._used, np.maximum(self._limits(), _LEAST_SLACK), 1.0)
         self._multipliers[:] = np.where(self._used, _FIRST_BARRIER * self._share() / self._slacks, 0.0)
-        self._infeasibility = self._largest_violation()
+        self._infeasibility, self._moved = self._largest_violation(), np.inf
 
     def solve(self, monitor: Monitor) -> tuple[Status, int]:
         """Iterate to the optimum and return how that ended, and after how many iterations.
 
         Args:
-            monitor: Told at each iteration.
+            monitor: Told of the first iterate, and after each iteration.
         """
         least, in_vain = np.inf, 0
-        for iteration in range(_MOST_ITERATIONS):
+        for iteration in range(_MOST_ITERATIONS + 1):
             if not np.isfinite(self._infeasibility):
                 return Status.EVALUATION_ERROR, iteration
             verdict = monitor(IterationState(iteration, self._step.objective(), self._infeasibility))
             if verdict is not None:
                 return verdict, iteration
+            if self._is_done():
+                return Status.SOLVED, iteration
             in_vain = 0 if self._infeasibility < least else in_vain + 1
             least = min(least, self._infeasibility)
-            if in_vain > _MOST_IN_VAIN:
-                return Status.ITERATION_LIMIT, iteration
+            if in_vain > _MOST_IN_VAIN or iteration == _MOST_ITERATIONS:
+                break
             joined = self._factored(_CURVATURES if iteration else _FIRST_CURVATURES)
             if joined is None:
                 return Status.SOLVER_ERROR, iteration
-            direction = self._best_direction(joined)
-            self._move(direction)
-            if self._is_done(direction):
-                return Status.SOLVED, iteration + 1
-        return Status.ITERATION_LIMIT, _MOST_ITERATIONS
+            self._move(self._best_direction(joined))
+        return Status.ITERATION_LIMIT, iteration
 
     def _of(self, name: str) -> FloatArray:
         return self._step.unknowns.of(self._step.iterate, name)
@@ -124,10 +123,9 @@ class InteriorPoint:
         """Return the objective for each inequality."""
         return self._step.objective() / int(self._used.sum())
 
-    def _is_done(self, last: _Direction) -> bool:
-        moved = [np.abs(self._step.unknowns.of(last.change, name)).max() for name in ("omega", "springs")]
+    def _is_done(self) -> bool:
         small = self._infeasibility < _INFEASIBILITY and self._product() < _GAP * self._share()
-        return bool(small and max(moved) < _LAST_STEP)
+        return small and self._moved < _LAST_STEP
 
     def _largest_violation(self) -> float:
         of_limits = np.abs(self._limits() - self._slacks)[self._used].max()
@@ -213,6 +211,8 @@ class InteriorPoint:
         iterate[unknowns.dual] += direction.dual * direction.change[unknowns.dual]
         self._step.evaluate()
         self._ends.evaluate(self._step)
+        changes = (unknowns.of(direction.change, name) for name in ("omega", "springs"))
+        self._moved = max(float(np.abs(change).max()) for change in changes)
         self._infeasibility = self._largest_violation()
 
 
