@@ -186,7 +186,8 @@ class RefinedSolves:
         if self._condenses and is_single_support(mesh.phases):
             monitor = self.session.monitor(_STAGE, self._objective_unit)
             lengths = mesh.lengths(points.durations)
-            found = solve_condensed(self.request, self.walker, lengths, points, monitor)
+            tolerance = self.session.options.tolerance
+            found = solve_condensed(self.request, self.walker, lengths, points, tolerance, monitor)
             self.session.iterations += found.iterations
             if found.points is not None:
                 trajectory, spring = trajectory_on(mesh, found.points), found.points.spring

@@ -26,6 +26,8 @@ IntArray = NDArray[np.int64]
 _TOLERANCE = 1e-10  # of a step of the integrator, relative and in [rad], [m], [kg m/s]
 # What SciPy's integrators accept.
 _LEAST_RELATIVE_TOLERANCE = 100 * np.finfo(np.float64).eps
+# Of an interval: what SciPy would begin with is so short that it costs a step more.
+_FIRST_STEP = 0.5
 _END = np.ones(1)
 # Feet that stand or slip are held on the surface that they are on: of the ground its slope counts.
 _ANY_TREAD = 1.0
@@ -115,6 +117,7 @@ def _replayed(
         starts.ravel(),
         method="DOP853",
         t_eval=places,
+        first_step=_FIRST_STEP,
         rtol=max(tolerance, _LEAST_RELATIVE_TOLERANCE),
         atol=tolerance,
     )

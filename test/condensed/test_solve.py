@@ -23,6 +23,8 @@ from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription.mesh import even_mesh
 
+TOLERANCE = 1e-9
+
 
 def session():
     return SolveSession(solver_settings(), 300.0, None)
@@ -34,7 +36,7 @@ def go_on(state):
 
 def condensed(start, request, walker=None, monitor=go_on):
     lengths = start.mesh.lengths(np.array([request.step_time]))
-    return solve_condensed(request, walker or start.gait.walker, lengths, start.points, monitor)
+    return solve_condensed(request, walker or start.gait.walker, lengths, start.points, TOLERANCE, monitor)
 
 
 def certificate_of(walker, request, start, points):
@@ -104,7 +106,7 @@ def test_what_it_tells_is_true_and_it_ends_when_told_to(start):
     told.clear()
     found = condensed(start, request, monitor=told.append)
     assert [state.iteration for state in told] == [*range(found.iterations + 1)]
-    assert told[-1].infeasibility < 1e-6
+    assert told[-1].infeasibility < TOLERANCE
 
 
 @needs_compiler

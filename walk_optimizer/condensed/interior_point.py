@@ -23,12 +23,10 @@ _MOST_ITERATIONS = 40
 _MOST_IN_VAIN = 12
 # First products of slacks and multipliers add up to so many times the objective.
 _FIRST_BARRIER = 3.0
-# They add up to this part of it at the end: what the objective may be above the optimum.
+# They add up to this part of it at the end, or to less: what the objective may be above the optimum.
 _GAP = 1e-6
-# No product is wanted smaller than this part of the objective for each inequality.
-_LEAST_PRODUCT = 3e-7
-# Largest violation of an equation, in natural units.
-_INFEASIBILITY = 1e-6
+# No product is wanted smaller than this part of what it may be at the end.
+_LEAST_PRODUCT = 0.3
 # Largest change of an angular velocity in [rad/s], and of K and q_eq in their units, by the last step.
 _LAST_STEP = 1e-2
 # Products stay this part of the objective above zero for each unit of infeasibility: iterates that are on
@@ -70,14 +68,16 @@ class _Direction:
 class InteriorPoint:
     """Finds the step of least torque near the iterate of a condensed step."""
 
-    def __init__(self, step: CondensedStep, ends: Ends) -> None:
+    def __init__(self, step: CondensedStep, ends: Ends, tolerance: float) -> None:
         """Take the first iterate: angular velocities, start, springs and torques are set.
 
         Args:
             step: The step; its iterate is changed in place.
             ends: Its ends.
+            tolerance: Largest violation of an equation, in natural units, and largest mean product of
+                slacks and multipliers, at which the step counts as solved.
         """
-        self._step, self._ends = step, ends
+        self._step, self._ends, self._tolerance = step, ends, tolerance
         at_nodes = np.ones(step.limits.shape, dtype=bool)
         at_nodes[-1, GAP_LIMIT] = False  # of the foot that lands
         self._used = np.concatenate([at_nodes.ravel(), ends.used])
@@ -124,8 +124,12 @@ class InteriorPoint:
         return self._step.objective() / int(self._used.sum())
 
     def _is_done(self) -> bool:
-        small = self._infeasibility < _INFEASIBILITY and self._product() < _GAP * self._share()
+        small = self._infeasibility < self._tolerance and self._product() < self._last_product()
         return small and self._moved < _LAST_STEP
+
+    def _last_product(self) -> float:
+        """Return the mean product below which the objective is close enough to the optimum."""
+        return min(self._tolerance, _GAP * self._share())
 
     def _largest_violation(self) -> float:
         of_limits = np.abs(self._limits() - self._slacks)[self._used].max()
@@ -159,7 +163,7 @@ class InteriorPoint:
         product = self._product()
         centring = (float(ahead) / int(self._used.sum()) / product) ** 3
         floor = min(product, _PRODUCTS_FOR_INFEASIBILITY * self._share() * self._infeasibility)
-        target = max(centring * product, _LEAST_PRODUCT * self._share(), floor)
+        target = max(centring * product, _LEAST_PRODUCT * self._last_product(), floor)
         # The part of second order belongs to a full step: a shorter one takes less of it [Colombo2008].
         targets = target - affine.primal * affine.dual * of_slacks * of_multipliers
         best = self._direction(joined, targets, _TO_THE_BOUNDARY)

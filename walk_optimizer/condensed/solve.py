@@ -49,6 +49,7 @@ def solve_condensed(
     walker: WalkerParameters,
     lengths: FloatArray,
     guess: RefinedPoints,
+    tolerance: float,
     monitor: Monitor,
 ) -> CondensedSolution:
     """Return the solution near a guess; without a C compiler there is none.
@@ -61,6 +62,7 @@ def solve_condensed(
         walker: The walker.
         lengths: Of the intervals in [s], (n,); they add up to the time of the step.
         guess: First guess on these intervals.
+        tolerance: Violation of the equations, scaled, and product of slacks and multipliers at the end.
         monitor: Told at each iteration.
     """
     code = kernel()
@@ -71,7 +73,7 @@ def solve_condensed(
     threads = min(_MOST_THREADS, free_processors())
     step = CondensedStep(code, walker, request.step_length, lengths, unknowns, threads)
     begin(step, ends, walker, guess)
-    status, iterations = InteriorPoint(step, ends).solve(monitor)
+    status, iterations = InteriorPoint(step, ends, tolerance).solve(monitor)
     if status is not Status.SOLVED:
         return CondensedSolution(status, iterations)
     points = _solution(step, ends, walker)

@@ -22,7 +22,7 @@ class BackEndEntry:
         package: Python package that it needs beside CasADi; empty for none.
         remedy: What to do where it is missing.
         condenses: Whether steps in single support that begin near a solution are left to the condensed
-            method: an interior point as well, which knows such steps, with tolerances of its own.
+            method: an interior point as well, which knows such steps.
     """
 
     name: str
