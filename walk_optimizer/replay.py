@@ -99,15 +99,22 @@ def _replayed(
     from scipy.integrate import solve_ivp
 
     count = indices.size
-    rates = _rates(modes, count)
-    springs = np.tile([[spring.stiffness], [spring.equilibrium]], count)
-    walkers = np.tile(np.reshape(walker.vector(_ANY_TREAD), (-1, 1)), count)
-    lengths = trajectory.lengths[indices]
+    # CasADi reads and writes these in place, one walker behind the other: to convert them takes longer than
+    # to evaluate the rates.
+    states, rates, torques = np.empty((count, 12)), np.empty((count, 12)), np.empty((count, 3))
+    springs = np.tile([spring.stiffness, spring.equilibrium], (count, 1))
+    walkers = np.tile(np.array(walker.vector(_ANY_TREAD), dtype=float), (count, 1))
+    lengths = trajectory.lengths[indices, None]
+    buffer, evaluate = _rates(modes, count).buffer()
+    for number, array in enumerate((states, torques, springs, walkers)):
+        buffer.set_arg(number, array.data)
+    buffer.set_res(0, rates.data)
 
     def derivative(place: float, current: FloatArray) -> FloatArray:
-        torques = trajectory.torques_at(indices, place)
-        columns = np.array(rates(current.reshape(count, 12).T, torques.T, springs, walkers))
-        return (columns * lengths).T.ravel()
+        states[:] = current.reshape(count, 12)
+        torques[:] = trajectory.torques_at(indices, place)
+        evaluate()
+        return (rates * lengths).ravel()
 
     # The integrator bounds the mean square of all errors, which may come from one interval alone.
     tolerance /= np.sqrt(count)
@@ -123,8 +130,8 @@ def _replayed(
     )
     if not result.success:
         return np.full((count, places.size, 12), np.inf)
-    states: FloatArray = result.y.reshape(count, 12, places.size).transpose(0, 2, 1)
-    return states
+    reached: FloatArray = result.y.reshape(count, 12, places.size).transpose(0, 2, 1)
+    return reached
 
 
 def contact_modes(walker: WalkerParameters, spring: KneeSpring, trajectory: RefinedTrajectory) -> list[Modes]:

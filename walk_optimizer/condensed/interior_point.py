@@ -81,6 +81,7 @@ class InteriorPoint:
         at_nodes = np.ones(step.limits.shape, dtype=bool)
         at_nodes[-1, GAP_LIMIT] = False  # of the foot that lands
         self._used = np.concatenate([at_nodes.ravel(), ends.used])
+        self._unused = np.flatnonzero(~self._used)
         step.evaluate(settle=True)
         ends.evaluate(step)
         self._slacks, self._multipliers = self._of("slacks"), self._of("multipliers")
@@ -184,9 +185,9 @@ class InteriorPoint:
         return np.maximum(wanted - products, -_LARGEST * target)
 
     def _direction(self, joined: JoinedEnds, targets: FloatArray, to_the_boundary: float) -> _Direction:
-        """Return the Newton direction to wanted products of slacks and multipliers."""
+        """Return the Newton direction to wanted products of slacks and multipliers, set to 0 where unused."""
         step, of_ends = self._step, slice(-self._ends.size, None)
-        targets = np.where(self._used, targets, 0.0)
+        targets[self._unused] = 0.0
         slacks, multipliers = self._slacks[of_ends], self._multipliers[of_ends]
         excess = self._ends.limits - slacks
         held = np.where(self._ends.used, (targets[of_ends] - multipliers * excess) / slacks, 0.0)
@@ -196,7 +197,7 @@ class InteriorPoint:
         of_slacks, of_multipliers = self._changes(direction)
         of_slacks[of_ends] = excess + change
         of_multipliers[of_ends] = (targets[of_ends] - multipliers * of_slacks[of_ends]) / slacks - multipliers
-        of_slacks[~self._used] = of_multipliers[~self._used] = 0.0
+        of_slacks[self._unused] = of_multipliers[self._unused] = 0.0
         unknowns = step.unknowns
         unknowns.of(direction, "passive")[:] -= self._of("passive")
         unknowns.of(direction, "joints")[:] = joints - self._of("joints")
