@@ -120,8 +120,7 @@ def refine(gait: Gait, session: SolveSession) -> RefinedSolution:
 
 def _begun(solves: "RefinedSolves", first: "FirstGuess", mesh: Mesh) -> RefinedSolution:
     """Return the solution on an initial mesh, solved again without phases that shrink to nothing."""
-    alone = mesh.phases == first.single_support
-    limit = _MOST_ITERATIONS if alone else _MOST_ITERATIONS_OF_OTHER_PHASES
+    limit = _MOST_ITERATIONS if is_single_support(mesh.phases) else _MOST_ITERATIONS_OF_OTHER_PHASES
     solution = solves.solved(mesh, first.points(mesh), limit)
     if solution.trajectory is None:
         return solution

@@ -45,11 +45,8 @@ static void rate_columns(const Step *step, int k, double rates[NODES][MOMENTA][P
 static inline void add_row(
     const Step *step, double h, int i, int row, double factor, const double rates[MOMENTA][PADDED],
     double *sum) {
-    if (row < ANGLES) {
-        sum[START + row] += factor;
-        for (int j = 0; j < NODES; j++) sum[ANGLES * j + row] += h * step->butcher[i][j] * factor;
-    } else if (row < RATE) {
-        sum[ANGLES * (i - 1) + row] += factor; /* row counts from ANGLES */
+    if (row < RATE) {
+        add_state_row(step, h, i, row, factor, sum);
     } else if (row < SPRING) {
         const double *rate = rates[row - RATE];
         for (int c = 0; c < PADDED; c++) sum[c] += factor * rate[c];

@@ -103,6 +103,20 @@ typedef struct {
 /* Evaluates one range of intervals. */
 typedef void (*Part)(Step *step, int begin, int end);
 
+/* The derivative at node i of the polynomial through values (., 6) at the start and the nodes. */
+void differentiate(const Step *step, int k, int i, const double *values, double *rate);
+
+/* Adds factor times theta or omega (row) at node i of an interval of length h to a vector of condensed
+ * variables: theta_i = theta_0 + h sum_j A_ij omega_j. */
+static inline void add_state_row(const Step *step, double h, int i, int row, double factor, double *sum) {
+    if (row < ANGLES) {
+        sum[START + row] += factor;
+        for (int j = 0; j < NODES; j++) sum[ANGLES * j + row] += h * step->butcher[i][j] * factor;
+    } else {
+        sum[ANGLES * i + row - ANGLES] += factor;
+    }
+}
+
 /* Runs a part for all intervals, on as many threads as the step may use. */
 void for_all_intervals(Step *step, Part part);
 

@@ -145,12 +145,7 @@ EXPORT void spread(Step *step, const double *ends, const double *targets) {
             memcpy(changes[i] + SPRING, ends + STATE, sizeof(double) * 2);
         }
         for (int i = 0; i < NODES; i++) {
-            for (int m = 0; m < MOMENTA; m++) {
-                double sum = 0.0;
-                for (int j = 0; j <= NODES; j++)
-                    sum += step->differentiation[i][j] * step->step_momenta[MOMENTA * (NODES * k + j) + m];
-                changes[i][RATE + m] = sum / h;
-            }
+            differentiate(step, k, i, step->step_momenta, changes[i] + RATE);
             step_point(step, NODES * k + i, changes[i], targets);
         }
         memcpy(state, changes[NODES - 1], sizeof state);

@@ -81,9 +81,10 @@ class InteriorPoint:
         at_nodes = np.ones(step.limits.shape, dtype=bool)
         at_nodes[-1, GAP_LIMIT] = False  # of the foot that lands
         self._used = np.concatenate([at_nodes.ravel(), ends.used])
-        self._unused = np.flatnonzero(~self._used)
+        self._unused, self._count = np.flatnonzero(~self._used), int(self._used.sum())
         step.evaluate(settle=True)
         ends.evaluate(step)
+        self._objective = step.objective()
         self._slacks, self._multipliers = self._of("slacks"), self._of("multipliers")
         self._slacks[:] = np.where(self._used, np.maximum(self._limits(), _LEAST_SLACK), 1.0)
         self._multipliers[:] = np.where(self._used, _FIRST_BARRIER * self._share() / self._slacks, 0.0)
@@ -99,7 +100,7 @@ class InteriorPoint:
         for iteration in range(_MOST_ITERATIONS + 1):
             if not np.isfinite(self._infeasibility):
                 return Status.EVALUATION_ERROR, iteration
-            verdict = monitor(IterationState(iteration, self._step.objective(), self._infeasibility))
+            verdict = monitor(IterationState(iteration, self._objective, self._infeasibility))
             if verdict is not None:
                 return verdict, iteration
             if self._is_done():
@@ -122,7 +123,7 @@ class InteriorPoint:
 
     def _share(self) -> float:
         """Return the objective for each inequality."""
-        return self._step.objective() / int(self._used.sum())
+        return self._objective / self._count
 
     def _is_done(self) -> bool:
         small = self._infeasibility < self._tolerance and self._product() < self._last_product()
@@ -138,7 +139,7 @@ class InteriorPoint:
 
     def _product(self) -> float:
         """Return the mean product of slacks and multipliers."""
-        return float(self._slacks @ self._multipliers) / int(self._used.sum())
+        return float(self._slacks @ self._multipliers) / self._count
 
     def _factored(self, curvatures: tuple[float, ...]) -> JoinedEnds | None:
         """Factor with as much of the curvature as is convex."""
@@ -162,7 +163,7 @@ class InteriorPoint:
             self._multipliers + affine.dual * of_multipliers
         )
         product = self._product()
-        centring = (float(ahead) / int(self._used.sum()) / product) ** 3
+        centring = (float(ahead) / self._count / product) ** 3
         floor = min(product, _PRODUCTS_FOR_INFEASIBILITY * self._share() * self._infeasibility)
         target = max(centring * product, _LEAST_PRODUCT * self._last_product(), floor)
         # The part of second order belongs to a full step: a shorter one takes less of it [Colombo2008].
@@ -218,7 +219,7 @@ class InteriorPoint:
         self._ends.evaluate(self._step)
         changes = (unknowns.of(direction.change, name) for name in ("omega", "springs"))
         self._moved = max(float(np.abs(change).max()) for change in changes)
-        self._infeasibility = self._largest_violation()
+        self._objective, self._infeasibility = self._step.objective(), self._largest_violation()
 
 
 def _longest(values: FloatArray, changes: FloatArray, to_the_boundary: float) -> float:

@@ -32,8 +32,7 @@ static void place_angles(Step *step) {
     }
 }
 
-/* The derivative at node i of the polynomial through values (., 6) at the start and the nodes. */
-static void differentiate(const Step *step, int k, int i, const double *values, double *rate) {
+void differentiate(const Step *step, int k, int i, const double *values, double *rate) {
     for (int m = 0; m < MOMENTA; m++) {
         double sum = 0.0;
         for (int j = 0; j <= NODES; j++)

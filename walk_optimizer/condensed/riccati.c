@@ -20,12 +20,7 @@ typedef struct {
 
 /* Adds to columns of `sum` what the state at the end of an interval hands to its variables. */
 static inline void hand_back(const Step *step, double h, int row, double factor, double *sum) {
-    if (row < ANGLES) {
-        sum[START + row] += factor;
-        for (int j = 0; j < NODES; j++) sum[ANGLES * j + row] += h * step->butcher[NODES - 1][j] * factor;
-    } else {
-        sum[ANGLES * (NODES - 1) + row - ANGLES] += factor;
-    }
+    add_state_row(step, h, NODES - 1, row, factor, sum);
 }
 
 /* The Hessian of an interval and of the value behind it, (30, 32). */

@@ -243,8 +243,7 @@ def _load_limits(walker: WalkerParameters) -> tuple[FloatArray, FloatArray]:
 
     Both sides of the friction cone, and the vertical force that loads the foot as it has to be loaded.
     """
-    cosine, sine = np.cos(walker.terrain.slope), np.sin(walker.terrain.slope)
-    tangential, normal = np.array([cosine, sine]), np.array([-sine, cosine])
+    tangential, normal = walker.terrain.along_and_normal(np.eye(2))
     limit = walker.friction_coefficient * normal
     rows = np.array([limit - tangential, limit + tangential, [0.0, 1.0]]) / walker.weight
     return rows, np.array([0.0, 0.0, least_vertical_force(walker) / walker.weight])
