@@ -122,6 +122,7 @@ class Starter:
     def close(self):
         for node in self.nodes:
             node.kill()
+            print(f"--- what {node.name} printed:\n{node.output()}")  # pytest shows it where a test failed.
 
 
 def assert_left_cleanly(node, code):
