@@ -14,11 +14,12 @@ FOREVER = 3600.0
 class Silent(SuiteNode):
     """The node."""
 
-    def __init__(self):
+    def __init__(self, announced=True):
         super().__init__("silent", [])
         self.asked = 0
         self.serve(Trigger, "~/ask", self._keep_silent)
-        self.announce()
+        if announced:
+            self.announce()
 
     async def _keep_silent(self, _request, _response):
         self.asked += 1

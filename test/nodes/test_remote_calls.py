@@ -105,17 +105,38 @@ def start(tmp_path):
 @pytest.mark.parametrize("life", [0.0, LEASE], ids=["at once", "later"])
 def test_a_call_ends_when_its_node_is_killed_also_if_another_is_there_at_once(graph, asking, start, life):
     first = start()
-    graph.spin_until(lambda: asking.count_publishers("/silent/alive") == 1, "the first node")
     call = Call(graph, asking, "/silent/ask")
     graph.spin_until(lambda: first.said("asked") or call.task.done(), "the question")
     assert not call.task.done(), call.task.result()
-    graph.spin_until(lambda: call.service._life, "its name")
     graph.spin_for(life)
     first.process.kill()
     start()
     error = graph.result(call.task)
     assert isinstance(error, ServiceUnavailableError)
     assert "went away; ask again" in str(error)
+
+
+def test_a_service_is_called_once_its_node_has_told_of_its_life(graph, asking, monkeypatch):
+    monkeypatch.setattr("walk_optimizer.nodes.suite_node._DISCOVERY", FOREVER)
+    silent = Silent(announced=False)
+    graph.executor.add_node(silent)
+    call = Call(graph, asking, "/silent/ask")
+    graph.spin_until(lambda: call.service.available, "the service")
+    graph.spin_for(1.0)
+    assert not silent.asked
+    silent.announce()
+    graph.spin_until(lambda: silent.asked, "the question")
+    graph.executor.remove_node(silent)
+    silent.destroy_node()
+
+
+def test_a_service_whose_node_tells_no_life_is_called_none_the_less(graph, asking):
+    silent = Silent(announced=False)
+    graph.executor.add_node(silent)
+    Call(graph, asking, "/silent/ask")
+    graph.spin_until(lambda: silent.asked, "the question")
+    graph.executor.remove_node(silent)
+    silent.destroy_node()
 
 
 def test_a_death_counts_once_whatever_tells_of_it_first(asking):

@@ -4,6 +4,10 @@ ROS takes a killed process for alive until the lease of its discovery is over, 2
 node of the suite has a topic `~/alive`, with one latched message that tells one process from its
 successor. The liveliness of the topic is asserted by the middleware, not by Python, and lapses `LEASE`
 after the process is gone.
+
+The message also tells that answers will arrive. ROS knows when a client has found a service, not when the
+service has found the client, and until then drops answers without a word. Who gets the message has been
+found by its sender, and so has a client that was created before the subscription.
 """
 
 from uuid import uuid4
@@ -41,20 +45,21 @@ class RemoteService:
         losses: How often a node that offers the service has gone, also if another was there at once.
     """
 
-    def __init__(self, node: Node, kind: type, name: str, group: CallbackGroup) -> None:
+    def __init__(self, node: Node, kind: type, name: str, group: CallbackGroup | None = None) -> None:
         """Look for a service and for the life of its node.
 
         Args:
             node: That asks.
             kind: Service type.
             name: Of the service, which is `~/something` of a node of the suite.
-            group: Callback group of the client.
+            group: Callback group of the client; the node's own by default.
         """
+        self._node = node
         self.client: Client = node.create_client(kind, name, qos_profile=SERVICE, callback_group=group)
         self.losses, self._lost = 0, False
-        self._life = ""
+        self._life, self._mute = "", False
         folder = self.name.rpartition("/")[0]
-        node.create_subscription(
+        self._lives = node.create_subscription(
             String,
             f"{folder}/alive",
             self._on_start,
@@ -72,6 +77,20 @@ class RemoteService:
     def available(self) -> bool:
         """Whether a node offers the service that is not known to be dead."""
         return bool(self.client.service_is_ready()) and not self._lost
+
+    @property
+    def will_answer(self) -> bool:
+        """Whether the service is there, and its answers find us as far as one can know."""
+        return self.available and (bool(self._life) or self._mute)
+
+    def take_for_mute(self) -> None:
+        """Take note that the service's node has told no life for long: it is none of the suite."""
+        self._mute = True
+
+    def destroy(self) -> None:
+        """Look for the service no more."""
+        self._node.destroy_subscription(self._lives)
+        self._node.destroy_client(self.client)
 
     def finding(self, noun: str, without_it: str) -> Finding:
         """Return whether the service is there, for operators.
@@ -92,7 +111,7 @@ class RemoteService:
         """
         if self._life not in ("", message.data):
             self.losses += 1
-        self._life, self._lost = message.data, False
+        self._life, self._lost, self._mute = message.data, False, False
 
     def _on_liveliness(self, change: QoSLivelinessChangedInfo) -> None:
         """Note whether anybody lives; a node without the topic is never heard of, and counts as alive."""

@@ -20,7 +20,7 @@ from walk_optimizer.nodes.remote_service import RemoteService, announce_life
 
 # How often a wait looks whether the other node still lives, in [s].
 _WATCH_PERIOD = 0.1
-# A service may not be known yet for that long, in [s].
+# A service may not be known yet for that long, or not know us, in [s].
 _DISCOVERY = 3.0
 
 Answer = Callable[[Any, Any], Awaitable[None]]
@@ -180,10 +180,12 @@ class SuiteNode(Node):
     async def _offered(self, service: RemoteService, require_wanted: Callable[[], None]) -> bool:
         """Return whether a service is there, after giving discovery some time."""
         for _ in range(round(_DISCOVERY / _WATCH_PERIOD)):
-            if service.available:
+            if service.will_answer:
                 return True
             require_wanted()
             await self.sleep(_WATCH_PERIOD)
+        if service.available:
+            service.take_for_mute()
         return service.available
 
 
