@@ -7,8 +7,6 @@
 
 #include "condensed.h"
 
-#define EXPORT __attribute__((visibility("default")))
-
 /* The columns of T that are not trivial: rows of the momentum rate, (6, 24) for each node. */
 static void rate_columns(const Step *step, int k, double rates[NODES][MOMENTA][PADDED]) {
     double momenta[NODES + 1][MOMENTA][PADDED], h = step->lengths[k];

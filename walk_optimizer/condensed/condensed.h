@@ -15,6 +15,9 @@
 #ifndef CONDENSED_H
 #define CONDENSED_H
 
+/* What Python calls; all else is hidden. */
+#define EXPORT __attribute__((visibility("default")))
+
 enum {
     NODES = 3,
     ANGLES = 4,

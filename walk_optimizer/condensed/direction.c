@@ -3,8 +3,6 @@
 
 #include "condensed.h"
 
-#define EXPORT __attribute__((visibility("default")))
-
 void sweep_back(const Step *step, int k, const double *own, const double *lacking, double *gradient);
 void sweep_forward(const Step *step, int k, double *whole, double *multipliers);
 

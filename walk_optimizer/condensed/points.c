@@ -3,8 +3,6 @@
 
 #include "condensed.h"
 
-#define EXPORT __attribute__((visibility("default")))
-
 static void evaluate_momentum(Step *step, const double *state, int node) {
     const double *arguments[] = {state, step->walker};
     double *results[] = {

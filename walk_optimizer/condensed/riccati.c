@@ -9,8 +9,6 @@
 
 #include "condensed.h"
 
-#define EXPORT __attribute__((visibility("default")))
-
 /* For whoever provides the memory. */
 EXPORT const int elimination_bytes = sizeof(Elimination), step_bytes = sizeof(Step);
 

@@ -9,7 +9,7 @@ from walk_optimizer.condensed.ends import EXCHANGED, Ends
 from walk_optimizer.condensed.functions import ANGLES, hip_functions
 from walk_optimizer.condensed.interior_point import InteriorPoint
 from walk_optimizer.condensed.kernel import GAP_LIMIT, LIMITS, kernel
-from walk_optimizer.condensed.step import BUTCHER, CondensedStep, Unknowns
+from walk_optimizer.condensed.step import CondensedStep, Unknowns
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.sharing import free_processors
@@ -18,7 +18,7 @@ from walk_optimizer.solve.status import Status
 from walk_optimizer.transcription.compilation import compiled
 from walk_optimizer.transcription.mesh import RefinedPoints
 from walk_optimizer.transcription.scaling import spring_units, torque_unit
-from walk_optimizer.transcription.tableau import DIFFERENTIATION, STAGES, STATE_COEFFICIENTS
+from walk_optimizer.transcription.tableau import BUTCHER, DIFFERENTIATION, STAGES, STATE_COEFFICIENTS
 
 FloatArray = NDArray[np.float64]
 

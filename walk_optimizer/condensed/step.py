@@ -15,12 +15,10 @@ from walk_optimizer.condensed.kernel import ENDS, LIMITS, Kernel, Step, address
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.transcription.problems import state_bounds
 from walk_optimizer.transcription.refined_variables import least_vertical_force
-from walk_optimizer.transcription.tableau import DIFFERENTIATION, QUADRATURE, STAGES
+from walk_optimizer.transcription.tableau import BUTCHER, DIFFERENTIATION, QUADRATURE, STAGES
 
 FloatArray = NDArray[np.float64]
 
-# Butcher's matrix: the derivatives of a polynomial at the nodes belong to its values there.
-BUTCHER = np.linalg.inv(DIFFERENTIATION[:, 1:])
 # On the state at the end, in units of the objective per rad^2 and (rad/s)^2: below 10 some solves do not
 # end, and from there on it makes no difference.
 PENALTY = 100.0

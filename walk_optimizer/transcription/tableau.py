@@ -33,3 +33,5 @@ def _differentiation() -> FloatArray:
 
 DIFFERENTIATION = _differentiation()
 QUADRATURE = (1 / np.arange(1, 4)) @ NODE_COEFFICIENTS
+# The matrix A of the Butcher tableau: values at the nodes from derivatives there.
+BUTCHER = np.linalg.inv(DIFFERENTIATION[:, 1:])
