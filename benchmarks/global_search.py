@@ -18,13 +18,13 @@ from report import machine, table
 
 from walk_optimizer.contact.schedule import CONTACT_FAMILIES
 from walk_optimizer.gait import Gait
+from walk_optimizer.guess.starts import kinematic_starts
 from walk_optimizer.model.parameters import SpringMode
+from walk_optimizer.optimizer.search import SAME_OPTIMUM, Candidate, Search, distinct
+from walk_optimizer.optimizer.table_builder import loosened
 from walk_optimizer.request import KMH_PER_MS
-from walk_optimizer.search import SAME_OPTIMUM, Candidate, Search, distinct
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import table_solver_settings
-from walk_optimizer.starts import kinematic_starts
-from walk_optimizer.table_builder import loosened
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "benchmarks" / "global_search.md"
 MODES = tuple(SpringMode)

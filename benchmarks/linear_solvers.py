@@ -16,14 +16,14 @@ from measurements import growth_request, library_gait, walker
 from report import machine, ratio, save_section, seconds, table
 
 from walk_optimizer.contact.schedule import single_impact
-from walk_optimizer.guess import kinematic_guess
-from walk_optimizer.mesh_adaptation import resampled
-from walk_optimizer.refinement import BARRIER
+from walk_optimizer.guess.kinematic import kinematic_guess
+from walk_optimizer.guess.starts import kinematic_starts
+from walk_optimizer.refinement.mesh_adaptation import resampled
+from walk_optimizer.refinement.refine import BARRIER
+from walk_optimizer.refinement.resolve import mesh_of
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.resolve import mesh_of
 from walk_optimizer.solve import ipopt
 from walk_optimizer.solve.ipopt import IpoptOptions
-from walk_optimizer.starts import kinematic_starts
 from walk_optimizer.transcription.problems import fixed_schedule_problem, to_scaled
 from walk_optimizer.transcription.program import FloatArray, Problem
 from walk_optimizer.transcription.refined import RefinedProblem

@@ -14,19 +14,19 @@ from packaged import packaged_library
 from plain_refined import PlainRefined, phases_of
 from plain_transcription import FixedSchedule, PlainSolution, kinematic_points, search, with_free_contacts
 
-from walk_optimizer.certificate import certify
+from walk_optimizer.certificate.grid import certify
+from walk_optimizer.certificate.refined import certify_refined
 from walk_optimizer.gait import Certificate, Gait, RefinedGait, Trajectory
-from walk_optimizer.mechanics import foot_2_ahead
+from walk_optimizer.gait.refined_trajectory import RefinedTrajectory
+from walk_optimizer.guess.starts import kinematic_starts
+from walk_optimizer.model.mechanics import foot_2_ahead
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.optimizer import optimize
-from walk_optimizer.refined_certificate import certify_refined
-from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.optimizer.search import Search
+from walk_optimizer.refinement.resolve import resolve
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.resolve import resolve
-from walk_optimizer.search import Search
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
-from walk_optimizer.starts import kinematic_starts
 from walk_optimizer.transcription.tableau import NODES_WITH_START
 
 FloatArray = NDArray[np.float64]

@@ -12,10 +12,10 @@ import sympy as sm
 from measurements import Clock, FloatArray, Score, score_points, walker
 from plain_transcription import MAXIMUM_ITERATIONS
 
-from walk_optimizer.guess import kinematic_guess
+from walk_optimizer.guess.kinematic import kinematic_guess
+from walk_optimizer.guess.starts import kinematic_starts
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.starts import kinematic_starts
 
 SINKING = 5e-3  # depth under the whole weight in [m]
 ROUNDING = 1e-3  # height over which contact sets in, in [m]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from plain_transcription import STATES_RELABELLED, Units, walker_function
 
 from walk_optimizer.contact.observation import slip_velocities
-from walk_optimizer.guess import Start, kinematic_guess
+from walk_optimizer.guess.kinematic import Start, kinematic_guess
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
 

@@ -23,8 +23,8 @@ from peer_problem import (
 )
 from plain_transcription import MAXIMUM_ITERATIONS, RELAXATION, STATES_RELABELLED, TOLERANCE, FloatArray
 
+from walk_optimizer.guess.starts import kinematic_starts
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.starts import kinematic_starts
 
 INFINITE = 2e19  # what IPOPT and its kin take for no bound
 NEAR = 1e-9

@@ -20,8 +20,8 @@ from report import machine, table
 
 from walk_optimizer.gait import Gait, Trajectory
 from walk_optimizer.model.parameters import KneeSpring, SpringMode
+from walk_optimizer.optimizer.search import SAME_OPTIMUM, Candidate, Search, distinct
 from walk_optimizer.request import KMH_PER_MS
-from walk_optimizer.search import SAME_OPTIMUM, Candidate, Search, distinct
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import table_solver_settings
 from walk_optimizer.transcription import layout

@@ -20,8 +20,8 @@ from plain_transcription import (
 )
 
 from walk_optimizer.gait import RefinedGait
+from walk_optimizer.gait.refined_trajectory import RefinedTrajectory
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
-from walk_optimizer.refined_trajectory import RefinedTrajectory
 
 FloatArray = NDArray[np.float64]
 Feet = tuple[bool, bool]

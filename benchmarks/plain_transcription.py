@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.guess import Start, kinematic_guess
+from walk_optimizer.guess.kinematic import Start, kinematic_guess
 from walk_optimizer.model import dynamics
 from walk_optimizer.model.kinematics import foot_position
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters

@@ -16,7 +16,7 @@ from report import machine, save_section, table
 
 from walk_optimizer.errors import GaitNotFoundError
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
-from walk_optimizer.reference_solve import FIRST_ORDER, OPTIONS, solve_reference
+from walk_optimizer.optimizer.reference_solve import FIRST_ORDER, OPTIONS, solve_reference
 from walk_optimizer.request import KMH_PER_MS, GaitRequest, gait_table_settings
 
 HESSIANS = {"exact": OPTIONS, "first order": FIRST_ORDER}

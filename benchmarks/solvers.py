@@ -20,20 +20,20 @@ from isolation import run_isolated
 from other_solvers import OTHERS, available, solve_with
 from report import machine, table
 
-from walk_optimizer.certificate import certify
+from walk_optimizer.certificate.grid import certify
 from walk_optimizer.compiler import COMPILER_VARIABLE
 from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.gait import Trajectory
-from walk_optimizer.guess import kinematic_guess
+from walk_optimizer.guess.kinematic import kinematic_guess
+from walk_optimizer.guess.starts import kinematic_starts
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
+from walk_optimizer.optimizer.search import completed
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.search import completed
 from walk_optimizer.solve.back_end import SolveOptions
 from walk_optimizer.solve.registry import BACK_ENDS, back_end
 from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.solution import FloatArray, IterationState, Solution
 from walk_optimizer.solve.status import Status
-from walk_optimizer.starts import kinematic_starts
 from walk_optimizer.transcription.problems import (
     complementarity_problem,
     fixed_schedule_problem,

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from walk_optimizer.certificate import certify
+from walk_optimizer.certificate.grid import certify
+from walk_optimizer.certificate.refined import certify_refined
 from walk_optimizer.gait import Certificate, RefinedGait, Trajectory
+from walk_optimizer.guess.starts import kinematic_starts
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
-from walk_optimizer.refined_certificate import certify_refined
+from walk_optimizer.optimizer.search import Search
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.search import Search
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
-from walk_optimizer.starts import kinematic_starts
 
 WALKER = WalkerParameters()
 REQUEST = GaitRequest.for_step(0.25, 0.785, SpringMode.NONE, 20)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from walk_optimizer.certificate import certify
+from walk_optimizer.certificate.grid import certify
 from walk_optimizer.gait import Trajectory
 from walk_optimizer.model.parameters import KneeSpring, SpringMode
 

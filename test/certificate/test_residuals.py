@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from model.pinocchio_walker import PinocchioWalker
 
-from walk_optimizer.certificate import certify, landing_distance
+from walk_optimizer.certificate.grid import certify, landing_distance
 from walk_optimizer.gait import Certificate, CertificateEntry, Trajectory
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest

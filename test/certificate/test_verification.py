@@ -5,7 +5,7 @@ from dataclasses import replace
 from library.made_up_gait import with_refinement
 
 from walk_optimizer.gait_files import SUFFIX, write_gait_file
-from walk_optimizer.verification import verify_file
+from walk_optimizer.library.verification import verify_file
 
 
 def verified(solved, folder, **changes):

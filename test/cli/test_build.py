@@ -5,15 +5,15 @@ from dataclasses import replace
 import pytest
 from library.made_up_gait import made_up_gait
 
-from walk_optimizer.certificate import certify
+from walk_optimizer.certificate.grid import certify
+from walk_optimizer.certificate.refined import certify_refined
 from walk_optimizer.cli.library_build import bar_text, former_gaits, minutes, solve_text, store_better
 from walk_optimizer.gait_files import read_gait_file
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize
-from walk_optimizer.refined_certificate import certify_refined
+from walk_optimizer.optimizer.table_builder import TableProgress
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import SolveReport, Status
-from walk_optimizer.table_builder import TableProgress
 
 REQUEST = GaitRequest.for_speed(0.25 / 0.785, "stiffness", 20)
 

@@ -13,8 +13,8 @@ import pytest
 from cli.console import command, environment, walk_optimizer
 from library.made_up_gait import made_up_gait, with_refinement
 
-from walk_optimizer.gait_csv import COLUMNS, gait_csv
 from walk_optimizer.gait_files import gait_file_name, write_gait_file
+from walk_optimizer.gait_files.gait_csv import COLUMNS, gait_csv
 from walk_optimizer.library import cache_folder
 from walk_optimizer.model.parameters import WalkerParameters
 

@@ -7,14 +7,14 @@ import pytest
 from cli.console import walk_optimizer
 from library.made_up_gait import all_modes, made_up_gait, with_refinement
 
-from walk_optimizer import reproduction
 from walk_optimizer.cli import table_text
 from walk_optimizer.errors import ConfigurationError
+from walk_optimizer.figures import reproduction
 from walk_optimizer.figures.report_figures import HIP_ROWS
+from walk_optimizer.figures.reproduction import count_dents, report_speeds, rotation, sparsity
 from walk_optimizer.gait_files import gait_file_name, write_gait_file
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.reproduction import count_dents, report_speeds, rotation, sparsity
 from walk_optimizer.request import gait_table_settings
 
 WALKER = WalkerParameters()

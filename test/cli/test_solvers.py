@@ -6,7 +6,7 @@ from walk_optimizer.cli import gaits
 from walk_optimizer.cli.main import main
 from walk_optimizer.gait import Certificate, CertificateEntry
 from walk_optimizer.optimizer import Outcome
-from walk_optimizer.reference_solve import ReferenceOutcome
+from walk_optimizer.optimizer.reference_solve import ReferenceOutcome
 from walk_optimizer.solve import registry
 from walk_optimizer.solve.status import SolveReport, Status
 
@@ -20,7 +20,7 @@ def no_work(monkeypatch):
 
     monkeypatch.setattr(gaits, "optimize", never)
     monkeypatch.setattr(gaits, "optimize_from", never)
-    monkeypatch.setattr("walk_optimizer.reference_solve.solve_reference", never)
+    monkeypatch.setattr("walk_optimizer.optimizer.reference_solve.solve_reference", never)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_the_reports_formulation_prints_residuals(monkeypatch, capsys):
         report = SolveReport(Status.ITERATION_LIMIT, "stopped; dynamics is off", "ipopt", iterations=3000)
         return ReferenceOutcome(None, report, certificate)
 
-    monkeypatch.setattr("walk_optimizer.reference_solve.solve_reference", solve_reference)
+    monkeypatch.setattr("walk_optimizer.optimizer.reference_solve.solve_reference", solve_reference)
     assert main(["solve", "--speed", "0.42", "--formulation", "report"]) == 1
     shown = capsys.readouterr().out
     assert "iteration_limit: stopped; dynamics is off" in shown

@@ -11,9 +11,9 @@ from walk_optimizer.condensed.solve import begin
 from walk_optimizer.condensed.step import CondensedStep, Unknowns
 from walk_optimizer.gait import Gait
 from walk_optimizer.library import GaitLibrary
-from walk_optimizer.mesh_adaptation import resampled
 from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.resolve import mesh_of
+from walk_optimizer.refinement.mesh_adaptation import resampled
+from walk_optimizer.refinement.resolve import mesh_of
 from walk_optimizer.transcription.mesh import Mesh, RefinedPoints
 
 needs_compiler = pytest.mark.skipif(kernel() is None, reason="no C compiler")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from walk_optimizer.condensed.functions import end_functions, hip_functions, node_functions
-from walk_optimizer.mechanics import along_and_normal, foot_arm, mechanics_at
+from walk_optimizer.model.mechanics import along_and_normal, foot_arm, mechanics_at
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.transcription.scaling import spring_units, torque_unit

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from condensed.conftest import needs_compiler, start_of
 
+from walk_optimizer.certificate.refined import certify_refined
 from walk_optimizer.condensed import interior_point, solve
 from walk_optimizer.condensed.solve import solve_condensed
 from walk_optimizer.gait import Certificate, RefinedGait
-from walk_optimizer.mechanics import foot_2_ahead
-from walk_optimizer.mesh_adaptation import resampled, torque_saved, trajectory_on
+from walk_optimizer.model.mechanics import foot_2_ahead
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.optimizer import optimize
-from walk_optimizer.refined_certificate import certify_refined
-from walk_optimizer.refinement import RefinedSolves
+from walk_optimizer.refinement.mesh_adaptation import resampled, torque_saved, trajectory_on
+from walk_optimizer.refinement.refine import RefinedSolves
+from walk_optimizer.refinement.resolve import resolve
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.resolve import resolve
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.status import Status
@@ -214,7 +214,7 @@ def test_prices_tell_what_leaving_bounds_between_the_nodes_saves(library, speed)
 
 
 def test_another_back_end_is_not_bypassed(monkeypatch, library):
-    monkeypatch.setattr("walk_optimizer.refinement.solve_condensed", lambda *_: pytest.fail("it was"))
+    monkeypatch.setattr("walk_optimizer.refinement.refine.solve_condensed", lambda *_: pytest.fail("it was"))
     monkeypatch.setattr(RefinedSolves, "solved", lambda _, mesh, points: (mesh, points))
     settings = replace(solver_settings(), back_end="uno")
     start = start_of(library, 0.53, "none")

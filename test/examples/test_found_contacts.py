@@ -14,7 +14,7 @@ from walk_optimizer.examples.relaxation import best_of_ways
 from walk_optimizer.examples.relaxed_solve import RelaxedSolve
 from walk_optimizer.examples.terrain_gait import find_contacts, unscheduled_guess
 from walk_optimizer.gait import Certificate, CertificateEntry
-from walk_optimizer.guess import GuessShape
+from walk_optimizer.guess.kinematic import GuessShape
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.request import GaitRequest

@@ -8,7 +8,7 @@ import pytest
 from walk_optimizer.contact.schedule import FootMode
 from walk_optimizer.examples.standing_start import StandingStart, certify_standing, set_off, still_guess
 from walk_optimizer.gait import Trajectory
-from walk_optimizer.mechanics import foot_arm
+from walk_optimizer.model.mechanics import foot_arm
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings

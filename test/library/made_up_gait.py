@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from walk_optimizer.gait import Certificate, CertificateEntry, FloatArray, Gait, RefinedGait, Trajectory
+from walk_optimizer.gait.refined_trajectory import RefinedTrajectory
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
-from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import FamilyViolation, SolveReport, Status
 from walk_optimizer.transcription.tableau import NODES_WITH_START

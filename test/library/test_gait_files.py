@@ -15,11 +15,11 @@ from library.made_up_gait import made_up_gait, with_refinement
 
 from walk_optimizer.errors import GaitFileError
 from walk_optimizer.gait import Gait, RefinedGait, Trajectory
+from walk_optimizer.gait.refined_trajectory import RefinedTrajectory
 from walk_optimizer.gait_files import gait_file_name, read_gait_file, write_gait_file
 from walk_optimizer.gait_files.codec import decode, encode
 from walk_optimizer.gait_files.container import LARGEST_FILE
 from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.refined_trajectory import RefinedTrajectory
 
 
 def assert_same(found: Gait, expected: Gait) -> None:

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from walk_optimizer.certificate.refined import certify_refined
 from walk_optimizer.errors import ConfigurationError, GaitNotFoundError
-from walk_optimizer.interpolation import interpolated
-from walk_optimizer.interpolation_bounds import InterpolationBounds, interpolation_bounds
 from walk_optimizer.library import EXACT_SPEED_TOLERANCE, GaitLibrary, Source
-from walk_optimizer.mechanics import mechanics_at
+from walk_optimizer.library.interpolation import interpolated
+from walk_optimizer.library.interpolation_bounds import InterpolationBounds, interpolation_bounds
 from walk_optimizer.model.functions import evaluate
+from walk_optimizer.model.mechanics import mechanics_at
 from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.profile import profile_of
-from walk_optimizer.refined_certificate import certify_refined
+from walk_optimizer.references.profile import profile_of
 from walk_optimizer.request import GaitRequest, gait_table_settings
 from walk_optimizer.transcription.tableau import DIFFERENTIATION
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from library.made_up_gait import all_modes, made_up_gait, with_refinement
 
-from walk_optimizer import library as library_module
 from walk_optimizer.errors import GaitFileError, GaitNotFoundError, GaitNotWritableError, InvalidRequestError
 from walk_optimizer.gait_files import gait_file_name, write_gait_file
 from walk_optimizer.library import GaitLibrary, Source, cache_folder
+from walk_optimizer.library import gait_library as library_module
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.transition.table import TransitionTable
 

@@ -6,9 +6,9 @@ from itertools import product
 import pytest
 
 from walk_optimizer.library import GaitLibrary, table_folder
+from walk_optimizer.library.verification import verify_file, verify_folder
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.request import gait_table_settings
-from walk_optimizer.verification import verify_file, verify_folder
 
 WALKER = WalkerParameters.from_yaml()
 SPEEDS = gait_table_settings().table_speeds()

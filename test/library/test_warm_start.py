@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.library import GaitLibrary
+from walk_optimizer.library.warm_start import neighbours, optimize_from
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize
 from walk_optimizer.request import GaitRequest, gait_table_settings
 from walk_optimizer.solve.status import SolveReport, Status
-from walk_optimizer.warm_start import neighbours, optimize_from
 
 WALKER = WalkerParameters.from_yaml()
 SPEEDS = gait_table_settings().table_speeds()
@@ -72,7 +72,7 @@ def test_neighbours_that_lead_to_nothing_are_followed_by_a_search_unless_it_was_
         asked.append((len(seeds), from_scratch, time_limit))
         return Outcome(None, SolveReport(status, status.sentence, "ipopt", "", 2, 30, 1.5))
 
-    monkeypatch.setattr("walk_optimizer.warm_start.optimize", failing)
+    monkeypatch.setattr("walk_optimizer.library.warm_start.optimize", failing)
     outcome = optimize_from(library, GaitRequest.for_speed(BETWEEN, "none"), WALKER, time_limit=5.0)
     assert outcome.report.status is status
     ended = status in (Status.CANCELLED, Status.TIME_LIMIT)

@@ -12,8 +12,8 @@ from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.conversions import gait_to_message
 from walk_optimizer.nodes.qos import LATCHED, STREAM
-from walk_optimizer.profile import profile_of
 from walk_optimizer.references import JOINTS, cycle_reference
+from walk_optimizer.references.profile import profile_of
 
 NODE = "walker_visualizer"
 

@@ -13,10 +13,10 @@ from rclpy.serialization import deserialize_message, serialize_message
 from walk_optimizer_interfaces.msg import Gait, SolverReport
 
 from walk_optimizer.errors import GaitFileError, SolveFailedError
+from walk_optimizer.gait.refined_trajectory import RefinedTrajectory
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.conversions import gait_from_message, gait_to_message, request_of_message
 from walk_optimizer.nodes.streamed_gait import ReceivedGait
-from walk_optimizer.refined_trajectory import RefinedTrajectory
 
 MODE = "stiffness_and_equilibrium"
 

@@ -15,8 +15,8 @@ from rclpy.parameter import Parameter
 from walk_optimizer_interfaces.action import OptimizeGait as OptimizeGaitAction
 from walk_optimizer_interfaces.srv import OptimizeGait
 
-from walk_optimizer.background import GaitJob, submit_gait
 from walk_optimizer.errors import InvalidRequestError
+from walk_optimizer.jobs.gaits import GaitJob, submit_gait
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.nodes.gait_optimizer import GaitOptimizerNode
 from walk_optimizer.nodes.qos import SERVICE as SERVICE_QOS

@@ -12,8 +12,8 @@ from rcl_interfaces.msg import Log
 from walk_optimizer_interfaces.action import OptimizeGait as OptimizeGaitAction
 from walk_optimizer_interfaces.srv import OptimizeGait
 
-from walk_optimizer.background import outcome_of
 from walk_optimizer.errors import SolveFailedError
+from walk_optimizer.jobs.gaits import outcome_of
 from walk_optimizer.nodes import gait_optimizer
 from walk_optimizer.nodes.gait_optimizer import GaitOptimizerNode
 from walk_optimizer.optimizer import Outcome

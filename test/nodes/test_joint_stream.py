@@ -6,13 +6,13 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from references.paces import SLOW, STAND
+from walk.paces import SLOW, STAND
 
-from walk_optimizer.blending import blended
 from walk_optimizer.nodes import joint_stream
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.streamed_gait import StreamedGait
-from walk_optimizer.phase_clock import PhaseClock
+from walk_optimizer.walk.blending import blended
+from walk_optimizer.walk.phase_clock import PhaseClock
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from walk_optimizer.nodes.pacer import Pacer, Schedule
-from walk_optimizer.tick_statistics import TickStatistics
+from walk_optimizer.walk.tick_statistics import TickStatistics
 
 PERIOD = 0.002
 

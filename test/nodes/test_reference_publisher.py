@@ -30,8 +30,8 @@ from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.qos import LATCHED
 from walk_optimizer.nodes.streamed_gait import ReceivedGait
 from walk_optimizer.recording import describe_bag
-from walk_optimizer.reference_check import CycleMatcher
 from walk_optimizer.references import JOINTS
+from walk_optimizer.references.check import CycleMatcher
 from walk_optimizer.request import GaitRequest
 
 pytestmark = pytest.mark.ros

@@ -12,7 +12,7 @@ pytest.importorskip("rclpy")
 from library.made_up_gait import made_up_gait
 
 from walk_optimizer.errors import GaitFileError
-from walk_optimizer.library_entries import LibraryEntry, Source, summarize
+from walk_optimizer.library.entries import LibraryEntry, Source, summarize
 from walk_optimizer.nodes.conversions import (
     REFUSED,
     progress_to_message,

@@ -13,8 +13,8 @@ from library.made_up_gait import made_up_gait, with_refinement
 
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.nodes.cycle_message import CycleMessages, cycle_to_message
-from walk_optimizer.profile import profile_of
 from walk_optimizer.references import JOINTS, sample_cycle
+from walk_optimizer.references.profile import profile_of
 from walk_optimizer.resources import config_file
 
 KNOWN = yaml.safe_load((Path(__file__).parent / "ros2_control_parameters.yaml").read_text())

@@ -6,11 +6,11 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from walk_optimizer.joint_limits import JointLimitError, JointLimits
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.walk_commands import WalkCommands
-from walk_optimizer.phase_clock import PhaseClock
-from walk_optimizer.walk import Walk
+from walk_optimizer.walk.joint_limits import JointLimitError, JointLimits
+from walk_optimizer.walk.phase_clock import PhaseClock
+from walk_optimizer.walk.walk import Walk
 
 # Of a stand: 0.5 N m at the hips, 4 N m at the knees.
 HIPS, KNEES = 1.0, 5.0

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.search import completed
+from walk_optimizer.optimizer.search import completed
 
 FORWARD, BACKWARD = [15, 18], [16, 19]
 POINTS = arrays(float, (23, 3), elements=st.floats(-1.0, 1.0))

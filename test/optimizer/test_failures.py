@@ -10,8 +10,8 @@ import pytest
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.optimizer import optimize
+from walk_optimizer.optimizer.search import Search
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.search import Search
 from walk_optimizer.solve import session as session_module
 from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.solution import Solution

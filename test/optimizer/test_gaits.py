@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from optimizer.grids import GRIDS
 
-from walk_optimizer.certificate import certify
+from walk_optimizer.certificate.grid import certify
+from walk_optimizer.guess.starts import kinematic_starts
 from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.optimizer import optimize
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import Status
-from walk_optimizer.starts import kinematic_starts
 
 CASES = list(itertools.product(GRIDS, SpringMode))
 NONE, STIFFNESS, BOTH = SpringMode

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from walk_optimizer.certificate import certify, stance_load_entries
-from walk_optimizer.mechanics import mechanics_at
+from walk_optimizer.certificate.grid import certify, stance_load_entries
+from walk_optimizer.certificate.refined import certify_refined
+from walk_optimizer.certificate.replay import replay_step
+from walk_optimizer.model.mechanics import mechanics_at
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import optimize
-from walk_optimizer.refined_certificate import certify_refined
-from walk_optimizer.replay import replay_step
 from walk_optimizer.request import GaitRequest
 
 # Left alone the optimum slides its foot along the ground at this speed, and unloads the other one.

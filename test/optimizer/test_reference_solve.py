@@ -4,12 +4,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from walk_optimizer import reference_solve
 from walk_optimizer.compiler import COMPILER_VARIABLE
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
-from walk_optimizer.reference_solve import reference_guess, solve_reference
+from walk_optimizer.optimizer import reference_solve
+from walk_optimizer.optimizer.reference_solve import reference_guess, solve_reference
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.solution import Solution
 from walk_optimizer.solve.status import Status

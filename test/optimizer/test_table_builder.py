@@ -6,10 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from walk_optimizer import table_builder
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
-from walk_optimizer.optimizer import Outcome
+from walk_optimizer.optimizer import Outcome, table_builder
 from walk_optimizer.request import gait_table_settings
 from walk_optimizer.solve.status import SolveReport, Status
 

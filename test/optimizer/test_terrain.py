@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from walk_optimizer.certificate import certify
-from walk_optimizer.mechanics import foot_arm
+from walk_optimizer.certificate.grid import certify
+from walk_optimizer.model.mechanics import foot_arm
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.optimizer import optimize

@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from library.made_up_gait import made_up_gait, with_refinement
 
-from walk_optimizer.mechanics import foot_arm
 from walk_optimizer.model.kinematics import HIP_Y
+from walk_optimizer.model.mechanics import foot_arm
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.model.terrain import Terrain
-from walk_optimizer.profile import EulerProfile, RefinedProfile, join_error, profile_of, relabelled
+from walk_optimizer.references.profile import EulerProfile, RefinedProfile, join_error, profile_of, relabelled
 from walk_optimizer.transcription.tableau import NODES
 
 GAIT = made_up_gait(points=20)

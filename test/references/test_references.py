@@ -6,13 +6,13 @@ from library.made_up_gait import made_up_gait
 
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.library import GaitLibrary
-from walk_optimizer.mechanics import foot_arm
 from walk_optimizer.model.functions import evaluate
+from walk_optimizer.model.mechanics import foot_arm
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
-from walk_optimizer.profile import EulerProfile, profile_of
-from walk_optimizer.reference_check import CycleMatcher, CycleSearch
 from walk_optimizer.references import EXCHANGED_JOINTS, JOINTS, cycle_reference, sample_cycle
+from walk_optimizer.references.check import CycleMatcher, CycleSearch
+from walk_optimizer.references.profile import EulerProfile, profile_of
 
 SLOW = EulerProfile.of(made_up_gait(points=20))
 FAST = EulerProfile.of(made_up_gait(speed=0.8, points=30, torque=3.0))

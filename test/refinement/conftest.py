@@ -5,7 +5,7 @@ import pytest
 from walk_optimizer.gait import Gait, RefinedGait
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
-from walk_optimizer.refinement import refined_gait
+from walk_optimizer.refinement.refine import refined_gait
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
 

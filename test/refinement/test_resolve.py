@@ -10,9 +10,9 @@ from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.optimizer import with_continuation
-from walk_optimizer.refinement import RefinedSolves
+from walk_optimizer.refinement.refine import RefinedSolves
+from walk_optimizer.refinement.resolve import continued, resolve
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.resolve import continued, resolve
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
 
@@ -87,7 +87,7 @@ def test_a_mesh_is_divided_where_leaving_bounds_between_its_nodes_saves_too_much
     monkeypatch.setattr(
         RefinedSolves, "adapted", lambda *arguments: adapted.append(1) or original(*arguments)
     )
-    monkeypatch.setattr("walk_optimizer.resolve._MOST_SAVED", most_saved)
+    monkeypatch.setattr("walk_optimizer.refinement.resolve._MOST_SAVED", most_saved)
     slower = neighbours[1]
     gait = resolve(GaitRequest.for_speed(1.01 * slower.request.speed, "none"), [slower], session())
     assert gait.certificate.certified

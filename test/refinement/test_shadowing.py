@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from walk_optimizer import shadowing
+from walk_optimizer.certificate import shadowing
+from walk_optimizer.certificate.replay import interval_states, replay_step
+from walk_optimizer.certificate.shadowing import with_replayable_start
 from walk_optimizer.gait import FloatArray, Gait
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
-from walk_optimizer.replay import interval_states, replay_step
-from walk_optimizer.shadowing import with_replayable_start
 
 TABLE = GaitLibrary(WalkerParameters.from_yaml()).gaits()
 

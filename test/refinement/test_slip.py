@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from walk_optimizer.certificate.refined import certify_refined
+from walk_optimizer.certificate.replay import contact_modes
 from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.contact.schedule import FootMode, single_impact
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import optimize
-from walk_optimizer.refined_certificate import certify_refined
-from walk_optimizer.refinement import FirstGuess, RefinedSolves
-from walk_optimizer.replay import contact_modes
+from walk_optimizer.refinement.refine import FirstGuess, RefinedSolves
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings

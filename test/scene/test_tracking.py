@@ -7,7 +7,7 @@ import pytest
 from library.made_up_gait import made_up_gait, with_refinement
 
 from walk_optimizer.library import GaitLibrary
-from walk_optimizer.mechanics import foot_arm
+from walk_optimizer.model.mechanics import foot_arm
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.references import cycle_reference

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from walk_optimizer.mechanics import mechanics_at
-from walk_optimizer.refined_trajectory import RefinedTrajectory
-from walk_optimizer.replay import replay_step
+from walk_optimizer.certificate.replay import replay_step
+from walk_optimizer.gait.refined_trajectory import RefinedTrajectory
+from walk_optimizer.model.mechanics import mechanics_at
 from walk_optimizer.simulation.ending import Ending
 from walk_optimizer.simulation.ground import StepGround
 from walk_optimizer.simulation.linearization import largest_multiplier

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from walk_optimizer.mechanics import foot_arm, mechanics_at
 from walk_optimizer.model.functions import mass_matrices
 from walk_optimizer.model.kinematics import RELABELLED
+from walk_optimizer.model.mechanics import foot_arm, mechanics_at
 from walk_optimizer.simulation.pinned_walker import PinnedWalker
 from walk_optimizer.simulation.settings import KneeStop
 

@@ -12,7 +12,7 @@ from solve.small_programs import START, contradiction, logarithm, rosenbrock
 
 from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.errors import ConfigurationError, MissingDependencyError
-from walk_optimizer.guess import GuessShape, kinematic_guess
+from walk_optimizer.guess.kinematic import GuessShape, kinematic_guess
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve import fatrop, ipopt, registry, uno

@@ -10,7 +10,7 @@ import pytest
 from solve.small_programs import START, contradiction, logarithm, program, rosenbrock
 
 from walk_optimizer.contact.schedule import single_impact
-from walk_optimizer.guess import GuessShape, kinematic_guess
+from walk_optimizer.guess.kinematic import GuessShape, kinematic_guess
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.back_end import SolveOptions

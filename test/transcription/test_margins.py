@@ -8,7 +8,7 @@ import pytest
 from transcription.plain_program import dense, random_scaled_point
 
 from walk_optimizer.contact.schedule import single_impact
-from walk_optimizer.mechanics import mechanics_at
+from walk_optimizer.model.mechanics import mechanics_at
 from walk_optimizer.model.parameters import KneeSpring
 from walk_optimizer.transcription.mesh import even_mesh
 from walk_optimizer.transcription.phases import phases_of

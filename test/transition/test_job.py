@@ -2,10 +2,10 @@
 
 import pytest
 
+from walk_optimizer.jobs.transitions import TransitionJob, planned
 from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.transition.table import TransitionTable
 from walk_optimizer.transition.transition import Transition
-from walk_optimizer.transition_job import TransitionJob, planned
 
 
 @pytest.fixture

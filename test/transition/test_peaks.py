@@ -6,17 +6,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from walk_optimizer.joint_limits import (
+from walk_optimizer.model.parameters import SpringMode
+from walk_optimizer.references.profile import RefinedProfile
+from walk_optimizer.transition.builder import recomputed
+from walk_optimizer.transition.table import TransitionTable
+from walk_optimizer.walk.joint_limits import (
     JointLimitError,
     JointLimits,
     JointNeed,
     peaks_of_gait,
     peaks_of_solved,
 )
-from walk_optimizer.model.parameters import SpringMode
-from walk_optimizer.profile import RefinedProfile
-from walk_optimizer.transition.builder import recomputed
-from walk_optimizer.transition.table import TransitionTable
 
 SPRUNG = SpringMode.STIFFNESS_AND_EQUILIBRIUM
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from walk_optimizer.errors import ConfigurationError, InvalidRequestError
-from walk_optimizer.mechanics import mechanics_at
+from walk_optimizer.model.mechanics import mechanics_at
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.transition.settings import TransitionSettings

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from walk_optimizer.errors import GaitFileError, GaitNotFoundError
 from walk_optimizer.library import GaitLibrary
-from walk_optimizer.mechanics import mechanics_at
+from walk_optimizer.model.mechanics import mechanics_at
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
-from walk_optimizer.profile import RefinedProfile, StepSample
 from walk_optimizer.references import make_reference
+from walk_optimizer.references.profile import RefinedProfile, StepSample
 from walk_optimizer.transition.builder import table_pairs
 from walk_optimizer.transition.certificate import certify_steps
 from walk_optimizer.transition.files import TransitionName, read_transition_file

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from walk_optimizer.errors import InvalidRequestError
-from walk_optimizer.mechanics import foot_arm, mechanics_at
+from walk_optimizer.model.mechanics import foot_arm, mechanics_at
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
-from walk_optimizer.profile import RefinedProfile, join_error
+from walk_optimizer.references.profile import RefinedProfile, join_error
 from walk_optimizer.solve.settings import solver_settings
 from walk_optimizer.solve.status import Status
 from walk_optimizer.transition.builder import recomputed

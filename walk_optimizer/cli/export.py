@@ -44,8 +44,8 @@ def add_parser(verbs: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the gait."""
     from walk_optimizer.cli.gaits import chosen_gait
-    from walk_optimizer.gait_csv import gait_csv, refined_csv
     from walk_optimizer.gait_files.access import writable_target, write_text
+    from walk_optimizer.gait_files.gait_csv import gait_csv, refined_csv
 
     to_csv = refined_csv if args.grid == "refined" else gait_csv
     if args.output is None:

@@ -12,12 +12,12 @@ from walk_optimizer.errors import GaitNotFoundError, InvalidRequestError, SolveF
 from walk_optimizer.gait import Gait
 from walk_optimizer.gait_files import read_gait_file
 from walk_optimizer.library import GaitLibrary
+from walk_optimizer.library.warm_start import optimize_from
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import Outcome, optimize
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.settings import SolverSettings
 from walk_optimizer.solve.status import ProgressCallback
-from walk_optimizer.warm_start import optimize_from
 
 _Result = TypeVar("_Result")
 

@@ -44,8 +44,8 @@ def run_verify(args: argparse.Namespace) -> int:
     """Verify a folder."""
     from walk_optimizer.cli.text import aligned
     from walk_optimizer.library import table_folder
+    from walk_optimizer.library.verification import verify_folder
     from walk_optimizer.request import KMH_PER_MS
-    from walk_optimizer.verification import verify_folder
 
     found = verify_folder(args.folder or table_folder(), walker_from(args))
     rows = [("m/s", "km/h", "springs", "N", "worst family", "residual", "unit", "of allowed", "")]

@@ -25,7 +25,7 @@ from walk_optimizer.request import KMH_PER_MS, gait_table_settings
 if TYPE_CHECKING:
     from walk_optimizer.gait import Gait
     from walk_optimizer.model.parameters import WalkerParameters
-    from walk_optimizer.table_builder import TableProgress
+    from walk_optimizer.optimizer.table_builder import TableProgress
 
 _TEXT = """\
 solve the table that ships with the package
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     from walk_optimizer.gait_files.access import writable_folder
     from walk_optimizer.library import table_folder
     from walk_optimizer.model.parameters import SpringMode
-    from walk_optimizer.table_builder import build_table
+    from walk_optimizer.optimizer.table_builder import build_table
 
     folder = args.output or table_folder()
     writable_folder(folder, create=args.output is None)
@@ -84,7 +84,7 @@ def former_gaits(folder: Path, walker: "WalkerParameters") -> list["Gait"]:
     """Return the gaits of a folder whose certificates hold."""
     from walk_optimizer.gait_files import SUFFIX
     from walk_optimizer.gait_files.access import files_in
-    from walk_optimizer.verification import verify_file
+    from walk_optimizer.library.verification import verify_file
 
     verified = (verify_file(path, walker) for path in files_in(folder, SUFFIX))
     return [one.gait for one in verified if one.passed and one.gait is not None]
@@ -124,9 +124,9 @@ def store_better(gait: "Gait", folder: Path) -> bool:
     Returns:
         Whether anything was written.
     """
-    from walk_optimizer.comparison import best_of_both
     from walk_optimizer.gait_files import gait_file_name, write_gait_file
-    from walk_optimizer.verification import verify_file
+    from walk_optimizer.library.verification import verify_file
+    from walk_optimizer.optimizer.comparison import best_of_both
 
     path = folder / gait_file_name(gait)
     former = verify_file(path, gait.walker)

@@ -34,8 +34,8 @@ def add_parser(verbs: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw and write."""
     from walk_optimizer.cli.table_text import table_text
+    from walk_optimizer.figures.reproduction import reproduce
     from walk_optimizer.library import GaitLibrary
-    from walk_optimizer.reproduction import reproduce
 
     library = GaitLibrary(walker_from(args), args.library)
     table = table_text(library)

@@ -114,7 +114,7 @@ def _try_report(
     """Solve the report's own formulation and print how far it got."""
     from walk_optimizer.cli.gaits import watched
     from walk_optimizer.cli.text import certificate_text, gait_text, report_text, request_text
-    from walk_optimizer.reference_solve import solve_reference
+    from walk_optimizer.optimizer.reference_solve import solve_reference
 
     print(request_text(request))
     outcome = watched(
@@ -144,8 +144,8 @@ def run(args: argparse.Namespace) -> int:
         report_text,
         request_text,
     )
-    from walk_optimizer.gait_csv import write_csv
     from walk_optimizer.gait_files.access import writable_target
+    from walk_optimizer.gait_files.gait_csv import write_csv
     from walk_optimizer.library import GaitLibrary
 
     if args.formulation == "report":

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from walk_optimizer.cli.text import aligned, cost, markdown_line, number
 from walk_optimizer.errors import GaitNotFoundError
 from walk_optimizer.library import GaitLibrary
+from walk_optimizer.library.report_table import ReportResult, reported
 from walk_optimizer.model.parameters import KneeSpring, SpringMode
-from walk_optimizer.report_table import ReportResult, reported
 from walk_optimizer.request import KMH_PER_MS, gait_table_settings
 
 Rows = list[Sequence[str]]

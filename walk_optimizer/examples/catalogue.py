@@ -13,7 +13,7 @@ from walk_optimizer.examples.finger_model import Finger
 from walk_optimizer.examples.finger_problem import FingerTask
 from walk_optimizer.examples.standing_start import StandingStart, set_off
 from walk_optimizer.examples.terrain_gait import find_contacts
-from walk_optimizer.guess import GuessShape
+from walk_optimizer.guess.kinematic import GuessShape
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.request import GaitRequest

@@ -7,14 +7,14 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.certificate import certify_from
+from walk_optimizer.certificate.grid import certify_from
 from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.examples.finding import Finding
 from walk_optimizer.examples.free_end import free_end_functions
 from walk_optimizer.examples.relaxation import Way, best_of_ways, follow_relaxation
 from walk_optimizer.examples.relaxed_solve import RelaxedSolve
 from walk_optimizer.gait import Certificate, CertificateEntry, Trajectory
-from walk_optimizer.guess import leg_angles, resampled
+from walk_optimizer.guess.kinematic import leg_angles, resampled
 from walk_optimizer.model.kinematics import HIP_X, HIP_Y
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
 from walk_optimizer.model.symbolic import SymbolicWalker

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from walk_optimizer.certificate import certify, landing_distance
+from walk_optimizer.certificate.grid import certify, landing_distance
 from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.examples.finding import Finding
 from walk_optimizer.examples.relaxation import Way, best_of_ways, follow_relaxation
 from walk_optimizer.gait import Trajectory
-from walk_optimizer.guess import FloatArray, GuessShape, kinematic_guess
+from walk_optimizer.guess.kinematic import FloatArray, GuessShape, kinematic_guess
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from walk_optimizer.errors import GaitFileError
 from walk_optimizer.gait import Certificate, RefinedGait
+from walk_optimizer.gait.refined_trajectory import RefinedTrajectory
 from walk_optimizer.gait_files.checks import check_finite, check_shape, positive
 from walk_optimizer.gait_files.header import from_plain, to_plain
 from walk_optimizer.model.parameters import KneeSpring
-from walk_optimizer.refined_trajectory import RefinedTrajectory
 
 REFINED_PREFIX = "refined_"
 # Shape of each array on n intervals, behind the n; beside them are the n + 1 breaks.

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from walk_optimizer.gait import Gait
-from walk_optimizer.library_entries import Source
+from walk_optimizer.library.entries import Source
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.worker import BusyError
 

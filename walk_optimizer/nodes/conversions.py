@@ -19,9 +19,9 @@ from walk_optimizer.errors import GaitFileError, WalkOptimizerError
 from walk_optimizer.gait import Certificate, CertificateEntry, Gait, RefinedGait, Trajectory
 from walk_optimizer.gait_files.checks import positive
 from walk_optimizer.gait_files.refined import REFINED_PREFIX, ROW_SHAPES, refined_trajectory
-from walk_optimizer.library_entries import GaitSummary
+from walk_optimizer.library.entries import GaitSummary
 from walk_optimizer.model.parameters import KneeSpring, SpringMode, WalkerParameters
-from walk_optimizer.profile import EulerProfile
+from walk_optimizer.references.profile import EulerProfile
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.status import FamilyViolation, Progress, SolveReport, Status
 

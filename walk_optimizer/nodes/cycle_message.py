@@ -8,8 +8,8 @@ from builtin_interfaces.msg import Duration
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from walk_optimizer.nodes.conversions import doubles
-from walk_optimizer.profile import StepProfile
 from walk_optimizer.references import JOINTS, Cycle, require_rate, sample_cycle
+from walk_optimizer.references.profile import StepProfile
 from walk_optimizer.solve.worker import BusyError
 
 # Controllers interpolate between the points. To send more of them would hold up the stream.

@@ -24,8 +24,8 @@ from walk_optimizer.nodes.qos import LATCHED, STREAM
 from walk_optimizer.nodes.remote_service import RemoteService
 from walk_optimizer.nodes.streamed_gait import ReceivedGait
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
-from walk_optimizer.reference_check import CycleMatcher
 from walk_optimizer.references import JOINTS
+from walk_optimizer.references.check import CycleMatcher
 from walk_optimizer.request import GaitRequest
 
 _POLL = 0.05

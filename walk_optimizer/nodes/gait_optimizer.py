@@ -11,8 +11,8 @@ from rclpy.action.server import ServerGoalHandle
 from walk_optimizer_interfaces.action import OptimizeGait as OptimizeGaitAction
 from walk_optimizer_interfaces.srv import OptimizeGait
 
-from walk_optimizer.background import GaitJob, outcome_of, solve_job, submit_gait
 from walk_optimizer.errors import InvalidRequestError, SolveFailedError, WalkOptimizerError
+from walk_optimizer.jobs.gaits import GaitJob, outcome_of, solve_job, submit_gait
 from walk_optimizer.nodes.conversions import (
     gait_to_message,
     progress_to_message,

@@ -16,11 +16,11 @@ from walk_optimizer.nodes.stream_messages import StreamFormat, StreamMessages
 from walk_optimizer.nodes.streamed_gait import Goal, StreamedGait
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.walk_report import INACTIVE, WalkReport
-from walk_optimizer.phase_clock import PhaseClock
-from walk_optimizer.profile import StepProfile
-from walk_optimizer.stand import StandProfile
-from walk_optimizer.tick_statistics import Punctuality
-from walk_optimizer.walk import StepPlan, Walk
+from walk_optimizer.references.profile import StepProfile
+from walk_optimizer.walk.phase_clock import PhaseClock
+from walk_optimizer.walk.stand import StandProfile
+from walk_optimizer.walk.tick_statistics import Punctuality
+from walk_optimizer.walk.walk import StepPlan, Walk
 
 
 class JointStream:

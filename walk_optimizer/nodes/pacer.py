@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from walk_optimizer.tick_statistics import Punctuality, TickStatistics
+from walk_optimizer.walk.tick_statistics import Punctuality, TickStatistics
 
 # Linux wakes threads up to 50 microseconds late to save power, unless they ask for less, in [ns].
 _PR_SET_TIMERSLACK = 29

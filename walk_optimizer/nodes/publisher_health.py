@@ -6,8 +6,8 @@ from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.remote_service import RemoteService
 from walk_optimizer.nodes.speed_commands import SpeedCommands
 from walk_optimizer.nodes.walk_commands import WalkCommands
-from walk_optimizer.phase_clock import Motion
 from walk_optimizer.recording.status import RecorderStatus
+from walk_optimizer.walk.phase_clock import Motion
 
 _CHECKS = ("walk", "commands", "library", "timing", "recording")
 _MILLISECONDS = 1e3

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from walk_optimizer.errors import ConfigurationError
-from walk_optimizer.joint_limits import JointLimits, limits_of
 from walk_optimizer.library import Selection
 from walk_optimizer.model.parameters import SpringMode
 from walk_optimizer.nodes.parameters import NodeParameters, Setting, require_frame, require_name
@@ -13,6 +12,7 @@ from walk_optimizer.nodes.walker_setting import WALKER_FILE
 from walk_optimizer.recording import Compression, RecorderSettings
 from walk_optimizer.references import JOINTS
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.walk.joint_limits import JointLimits, limits_of
 
 CERTIFIED, BLENDED = "certified", "blended"
 

@@ -12,7 +12,6 @@ from std_srvs.srv import Trigger
 from walk_optimizer_interfaces.srv import GetGait, GetJointTrajectory, SetGait
 
 from walk_optimizer.errors import ConfigurationError, GaitNotFoundError, WalkOptimizerError
-from walk_optimizer.joint_limits import JointLimitError
 from walk_optimizer.nodes.bag import StreamBag
 from walk_optimizer.nodes.cycle_message import CycleMessages
 from walk_optimizer.nodes.joint_stream import JointStream
@@ -38,8 +37,9 @@ from walk_optimizer.nodes.transition_planner import TransitionPlanner
 from walk_optimizer.nodes.walk_commands import WalkCommands
 from walk_optimizer.nodes.walk_order import SupersededError
 from walk_optimizer.nodes.walker_setting import walker_of
-from walk_optimizer.phase_clock import Motion, PhaseClock
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.walk.joint_limits import JointLimitError
+from walk_optimizer.walk.phase_clock import Motion, PhaseClock
 
 # The executor may hold Python's lock for that long in [s], several times a tick; the usual is 5 ms.
 _SWITCH_INTERVAL = 0.00003

@@ -11,7 +11,6 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_msgs.msg import Float64
 
-from walk_optimizer.command_watch import CommandWatch
 from walk_optimizer.errors import InvalidRequestError, WalkOptimizerError
 from walk_optimizer.nodes.lifecycle import ManagedNode
 from walk_optimizer.nodes.planar_twist import IgnoredParts, forward_speed
@@ -20,6 +19,7 @@ from walk_optimizer.nodes.qos_warnings import warn_of_publishers
 from walk_optimizer.nodes.walk_commands import WalkCommands
 from walk_optimizer.nodes.walk_order import SupersededError
 from walk_optimizer.request import GaitRequest
+from walk_optimizer.walk.command_watch import CommandWatch
 
 # How often it is looked whether a stream of commands has fallen silent, in [s].
 _WATCH_PERIOD = 0.05

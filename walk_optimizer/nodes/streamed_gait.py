@@ -8,14 +8,14 @@ from walk_optimizer_interfaces.msg import SolverReport
 
 from walk_optimizer.errors import SolveFailedError
 from walk_optimizer.gait import Gait
-from walk_optimizer.joint_limits import JointPeaks
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.nodes.conversions import gait_from_message, request_of_message
-from walk_optimizer.profile import RefinedProfile, StepProfile, profile_of
+from walk_optimizer.references.profile import RefinedProfile, StepProfile, profile_of
 from walk_optimizer.solve.status import Status
-from walk_optimizer.stand import StandProfile
 from walk_optimizer.transition.paces import Pace
-from walk_optimizer.walk import StepPlan
+from walk_optimizer.walk.joint_limits import JointPeaks
+from walk_optimizer.walk.stand import StandProfile
+from walk_optimizer.walk.walk import StepPlan
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,27 +3,27 @@
 from collections import OrderedDict
 from typing import TypeAlias
 
-from walk_optimizer.blending import blended
 from walk_optimizer.errors import InvalidRequestError, SolveFailedError, WalkOptimizerError
 from walk_optimizer.gait import RefinedGait
 from walk_optimizer.gait_files.access import writable_folder
-from walk_optimizer.joint_limits import peaks_of, peaks_of_solved
+from walk_optimizer.jobs.transitions import TransitionJob, transition_job
 from walk_optimizer.model.parameters import KneeSpring
 from walk_optimizer.nodes.paths import named_path
 from walk_optimizer.nodes.publisher_settings import BLENDED
 from walk_optimizer.nodes.streamed_gait import Goal, Way, pace_of_goal, profile_of_goal
 from walk_optimizer.nodes.suite_node import SuiteNode
 from walk_optimizer.nodes.walker_setting import walker_of
-from walk_optimizer.profile import RefinedProfile
+from walk_optimizer.references.profile import RefinedProfile
 from walk_optimizer.solve.worker import BusyError, WorkerPool
 from walk_optimizer.solve.worker_task import Ticket
-from walk_optimizer.stand import StandProfile
 from walk_optimizer.transition.paces import Pace, border_state, pace_name, spring_of
 from walk_optimizer.transition.standing import Standing
 from walk_optimizer.transition.table import cache_folder
 from walk_optimizer.transition.torque_limit import TorqueLimit, exceeds, limit_in_words
-from walk_optimizer.transition_job import TransitionJob, transition_job
-from walk_optimizer.walk import StepPlan
+from walk_optimizer.walk.blending import blended
+from walk_optimizer.walk.joint_limits import peaks_of, peaks_of_solved
+from walk_optimizer.walk.stand import StandProfile
+from walk_optimizer.walk.walk import StepPlan
 
 # Transitions that are kept in memory; they take about 100 kB each.
 _KEPT = 64

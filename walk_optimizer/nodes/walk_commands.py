@@ -3,7 +3,6 @@
 from walk_optimizer_interfaces.srv import GetGait
 
 from walk_optimizer.errors import GaitNotFoundError, WalkOptimizerError
-from walk_optimizer.joint_limits import JointLimits, JointNeed, JointPeaks, peaks_of, peaks_of_gait
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.joint_stream import JointStream
 from walk_optimizer.nodes.lifecycle import ManagedNode
@@ -12,12 +11,13 @@ from walk_optimizer.nodes.streamed_gait import ReceivedGait, StreamedGait, profi
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
 from walk_optimizer.nodes.transition_planner import TransitionPlanner
 from walk_optimizer.nodes.walk_order import WalkOrder
-from walk_optimizer.phase_clock import Motion
 from walk_optimizer.request import GaitRequest
-from walk_optimizer.stand import StandProfile
 from walk_optimizer.transition.settings import transition_settings
 from walk_optimizer.transition.standing import standing_pose
-from walk_optimizer.walk_needs import PaceNeeds, WalkNeeds
+from walk_optimizer.walk.joint_limits import JointLimits, JointNeed, JointPeaks, peaks_of, peaks_of_gait
+from walk_optimizer.walk.needs import PaceNeeds, WalkNeeds
+from walk_optimizer.walk.phase_clock import Motion
+from walk_optimizer.walk.stand import StandProfile
 
 # Before the library is up, it is tried again after this time in [s].
 _RETRY_PERIOD = 1.0

@@ -7,8 +7,8 @@ from typing import Any
 from walk_optimizer_interfaces.msg import WalkState
 
 from walk_optimizer.nodes.streamed_gait import StreamedGait
-from walk_optimizer.phase_clock import Motion
-from walk_optimizer.walk import Walk
+from walk_optimizer.walk.phase_clock import Motion
+from walk_optimizer.walk.walk import Walk
 
 _SENTENCES = {
     "standing": "stands",

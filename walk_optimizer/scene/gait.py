@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.gait import Gait
-from walk_optimizer.mechanics import foot_arm, horizontal_and_vertical
-from walk_optimizer.profile import RefinedProfile, StepProfile, profile_of
-from walk_optimizer.reference_check import CycleSearch
+from walk_optimizer.model.mechanics import foot_arm, horizontal_and_vertical
+from walk_optimizer.references.check import CycleSearch
+from walk_optimizer.references.profile import RefinedProfile, StepProfile, profile_of
 
 FloatArray = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.mechanics import foot_arm
+from walk_optimizer.model.mechanics import foot_arm
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.scene.gait import Place, ShownGait
 from walk_optimizer.scene.ground import ground_height

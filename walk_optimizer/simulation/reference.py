@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from walk_optimizer.certificate.replay import contact_modes
 from walk_optimizer.contact.schedule import FootMode
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import Gait, RefinedGait
-from walk_optimizer.mechanics import mechanics_at
+from walk_optimizer.model.mechanics import mechanics_at
 from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.replay import contact_modes
 from walk_optimizer.simulation.pinned_walker import STATE_WIDTH, PinnedWalker
 
 FloatArray = NDArray[np.float64]

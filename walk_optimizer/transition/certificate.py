@@ -6,20 +6,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from walk_optimizer.certificate import landing_speed_entries, stance_load_entries
-from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
-from walk_optimizer.mechanics import along_and_normal, foot_2_ahead, mechanics_at
-from walk_optimizer.model.kinematics import HIP_X, HIP_Y
-from walk_optimizer.model.parameters import WalkerParameters
-from walk_optimizer.refined_certificate import (
+from walk_optimizer.certificate.grid import landing_speed_entries, stance_load_entries
+from walk_optimizer.certificate.refined import (
     bound_entries,
     collocation_entries,
     contact_entries,
     jump_entries,
     largest,
 )
-from walk_optimizer.refined_peaks import torque_peaks
-from walk_optimizer.replay import interval_errors
+from walk_optimizer.certificate.replay import interval_errors
+from walk_optimizer.gait import Certificate, CertificateEntry, RefinedGait
+from walk_optimizer.gait.refined_peaks import torque_peaks
+from walk_optimizer.model.kinematics import HIP_X, HIP_Y
+from walk_optimizer.model.mechanics import along_and_normal, foot_2_ahead, mechanics_at
+from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.transition.paces import (
     Pace,
     border_state,

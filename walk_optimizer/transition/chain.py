@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from walk_optimizer.gait import Certificate, RefinedGait
-from walk_optimizer.mechanics import foot_2_ahead
+from walk_optimizer.gait.refined_trajectory import RefinedTrajectory
 from walk_optimizer.model.kinematics import HIP_X
+from walk_optimizer.model.mechanics import foot_2_ahead
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
-from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.transcription.boundary import JOINT_ROWS
 from walk_optimizer.transcription.mesh import Mesh
 from walk_optimizer.transcription.transition import End

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from walk_optimizer.errors import GaitFileError
 from walk_optimizer.gait import Certificate, RefinedGait
+from walk_optimizer.gait.refined_trajectory import RefinedTrajectory
 from walk_optimizer.gait_files.access import read_limited, replace_file
 from walk_optimizer.gait_files.checks import check_shape, positive
 from walk_optimizer.gait_files.container import LARGEST_FILE, FileFormat, packed, unpacked
@@ -18,7 +19,6 @@ from walk_optimizer.gait_files.files import check_walker, transition_file_name, 
 from walk_optimizer.gait_files.header import from_plain, to_plain
 from walk_optimizer.gait_files.refined import REFINED_PREFIX, refined_trajectory
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
-from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.transition.certificate import JOINT_TOLERANCE
 from walk_optimizer.transition.paces import Pace, border_state, pace_name
 from walk_optimizer.transition.torque_limit import TorqueLimit, hip_and_knee

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import Gait, RefinedGait
-from walk_optimizer.mechanics import foot_2_ahead, foot_arm, mechanics_at
+from walk_optimizer.gait.refined_trajectory import RefinedTrajectory
 from walk_optimizer.model.functions import mass_matrices
 from walk_optimizer.model.kinematics import HIP_X, RELABELLED, UPPER_2
+from walk_optimizer.model.mechanics import foot_2_ahead, foot_arm, mechanics_at
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
-from walk_optimizer.refined_trajectory import RefinedTrajectory
 from walk_optimizer.transition.standing import Standing
 
 FloatArray = NDArray[np.float64]

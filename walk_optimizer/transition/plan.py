@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from walk_optimizer.certificate.replay import contact_modes
 from walk_optimizer.contact.schedule import FootMode
 from walk_optimizer.gait import Gait
-from walk_optimizer.replay import contact_modes
 from walk_optimizer.transcription.phases import Landing, Modes, Phase
 from walk_optimizer.transition.paces import Pace, refined_of
 from walk_optimizer.transition.standing import Standing

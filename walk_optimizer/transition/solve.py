@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import Certificate
-from walk_optimizer.mesh_adaptation import MeshErrors, resampled, trajectory_on
+from walk_optimizer.gait.refined_peaks import torque_peaks
+from walk_optimizer.gait.refined_trajectory import RefinedTrajectory
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
-from walk_optimizer.refined_peaks import torque_peaks
-from walk_optimizer.refined_trajectory import RefinedTrajectory
+from walk_optimizer.refinement.mesh_adaptation import MeshErrors, resampled, trajectory_on
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import SolverSettings, solver_settings
 from walk_optimizer.solve.status import FamilyViolation, ProgressCallback, SolveReport, Status

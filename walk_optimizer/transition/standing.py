@@ -8,8 +8,8 @@ from scipy.optimize import minimize_scalar
 
 from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import read_only
-from walk_optimizer.mechanics import foot_2_ahead, mechanics_at
 from walk_optimizer.model.dynamics import INPUT_MAP
+from walk_optimizer.model.mechanics import foot_2_ahead, mechanics_at
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 
 FloatArray = NDArray[np.float64]

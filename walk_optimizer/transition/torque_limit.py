@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from walk_optimizer.errors import InvalidRequestError, quoted
 from walk_optimizer.gait import RefinedGait
-from walk_optimizer.refined_peaks import torque_peaks
+from walk_optimizer.gait.refined_peaks import torque_peaks
 
 FloatArray = NDArray[np.float64]
 

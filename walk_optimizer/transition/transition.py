@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walk_optimizer.gait import Certificate, RefinedGait
+from walk_optimizer.gait.refined_peaks import torque_peaks
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
-from walk_optimizer.refined_peaks import torque_peaks
 from walk_optimizer.solve.status import SolveReport
 from walk_optimizer.transition.paces import Pace
 from walk_optimizer.transition.torque_limit import TorqueLimit

@@ -1,0 +1,1 @@
+"""Certificates of both grids: residuals in plain NumPy and torques replayed, apart from the solver."""

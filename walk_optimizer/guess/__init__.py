@@ -1,0 +1,1 @@
+"""First guesses, and which of them a search tries. Owns where a solve begins; solves nothing."""

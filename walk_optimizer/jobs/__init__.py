@@ -1,0 +1,1 @@
+"""Gaits and transitions as work of other processes: made cancellable, and shared by all who ask for them."""

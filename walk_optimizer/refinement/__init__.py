@@ -1,0 +1,1 @@
+"""The accurate solution: gaits of the report's grid refined, and speeds straight from refined neighbours."""
