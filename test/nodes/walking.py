@@ -5,6 +5,7 @@ from contextlib import contextmanager
 import numpy as np
 from nodes.graph import SETTLING
 from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from walk_optimizer_interfaces.msg import WalkState
 from walk_optimizer_interfaces.srv import SetGait
@@ -21,6 +22,7 @@ BLENDED = {"rate": 100.0, "transitions": "blended", "longest_gap": 10.0}
 MARGIN = 0.5
 # References that are further apart than this in [s], and what no joint exceeds between them in [rad/s].
 STALL, FASTEST = 0.03, 40.0
+PAUSE_TIME_NS = 300_000_000
 
 
 class Walker:
@@ -47,6 +49,16 @@ class Walker:
         answer = self.set_gait(speed)
         assert answer.success, answer.message
         self.wait_for("walking", speed)
+
+    def pause(self):
+        """Pause, and wait for the rest that follows by the default of `pause_time`."""
+        self.trigger("pause")
+        joints = self.listen(JointState, "joint_reference")
+
+        def at_rest():
+            return joints and stamp_ns(joints[-1]) - stamp_ns(joints[0]) > 2 * PAUSE_TIME_NS
+
+        self.graph.spin_until(at_rest, "the rest")
 
     def wait_for(self, state, speed=None):
         def there():
