@@ -19,8 +19,8 @@ from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.guess.kinematic import kinematic_guess
 from walk_optimizer.guess.starts import kinematic_starts
 from walk_optimizer.refinement.mesh_adaptation import resampled
-from walk_optimizer.refinement.refine import BARRIER
 from walk_optimizer.refinement.resolve import mesh_of
+from walk_optimizer.refinement.solves import BARRIER
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve import ipopt
 from walk_optimizer.solve.ipopt import IpoptOptions

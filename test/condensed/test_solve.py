@@ -15,8 +15,8 @@ from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.model.terrain import Terrain
 from walk_optimizer.optimizer import optimize
 from walk_optimizer.refinement.mesh_adaptation import resampled, torque_saved, trajectory_on
-from walk_optimizer.refinement.refine import RefinedSolves
 from walk_optimizer.refinement.resolve import resolve
+from walk_optimizer.refinement.solves import RefinedSolves
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
@@ -214,7 +214,7 @@ def test_prices_tell_what_leaving_bounds_between_the_nodes_saves(library, speed)
 
 
 def test_another_back_end_is_not_bypassed(monkeypatch, library):
-    monkeypatch.setattr("walk_optimizer.refinement.refine.solve_condensed", lambda *_: pytest.fail("it was"))
+    monkeypatch.setattr("walk_optimizer.refinement.solves.solve_condensed", lambda *_: pytest.fail("it was"))
     monkeypatch.setattr(RefinedSolves, "solved", lambda _, mesh, points: (mesh, points))
     settings = replace(solver_settings(), back_end="uno")
     start = start_of(library, 0.53, "none")

@@ -11,7 +11,8 @@ from walk_optimizer.contact.schedule import single_impact
 from walk_optimizer.gait import Certificate, CertificateEntry, Gait, RefinedGait
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.refinement.mesh_adaptation import _MOST_PARTS, MeshErrors, resampled
-from walk_optimizer.refinement.refine import RefinedSolves, refine
+from walk_optimizer.refinement.refine import refine
+from walk_optimizer.refinement.solves import RefinedSolves
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings
@@ -54,7 +55,7 @@ def test_where_accurate_intervals_add_up_to_too_much_the_mesh_gets_finer(
             return Certificate((CertificateEntry("stance_height", 1.02e-6, "m", 1e-6),))
         return certify_refined(walker, request, bare)
 
-    monkeypatch.setattr("walk_optimizer.refinement.refine.certify_refined", too_strict_at_first)
+    monkeypatch.setattr("walk_optimizer.refinement.solves.certify_refined", too_strict_at_first)
     found = RefinedSolves(gait.request, gait.walker, session).certified(solution)
     assert found is not None
     assert found.certificate.certified

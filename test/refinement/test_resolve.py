@@ -10,8 +10,8 @@ from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.library import GaitLibrary
 from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.optimizer import with_continuation
-from walk_optimizer.refinement.refine import RefinedSolves
 from walk_optimizer.refinement.resolve import continued, resolve
+from walk_optimizer.refinement.solves import RefinedSolves
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings

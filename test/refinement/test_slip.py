@@ -11,7 +11,8 @@ from walk_optimizer.contact.observation import schedule_of
 from walk_optimizer.contact.schedule import FootMode, single_impact
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.optimizer import optimize
-from walk_optimizer.refinement.refine import FirstGuess, RefinedSolves
+from walk_optimizer.refinement.first_guess import FirstGuess
+from walk_optimizer.refinement.solves import RefinedSolves
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.solve.settings import solver_settings

@@ -16,7 +16,7 @@ from walk_optimizer.errors import InvalidRequestError
 from walk_optimizer.gait import Gait, RefinedGait
 from walk_optimizer.model.parameters import KneeSpring, WalkerParameters
 from walk_optimizer.refinement.mesh_adaptation import resampled, torque_saved
-from walk_optimizer.refinement.refine import RefinedSolution, RefinedSolves, certified_refinement
+from walk_optimizer.refinement.solves import RefinedSolution, RefinedSolves, certified_refinement
 from walk_optimizer.request import GaitRequest
 from walk_optimizer.solve.session import SolveSession
 from walk_optimizer.transcription.layout import P
