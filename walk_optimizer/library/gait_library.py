@@ -1,7 +1,7 @@
 """The gait library: the packaged table and a user's cache, in memory and on disk.
 
 Owns what happens to files that can't be used. Does not own which gait answers a request
-(`library_selection`) nor the bytes of a file (`gait_files`), and solves nothing.
+(`selection`) nor the bytes of a file (`gait_files`), and solves nothing.
 """
 
 import os

@@ -75,7 +75,7 @@ class GaitOptimizerNode(SuiteNode):
     """Offers `~/optimize_gait` and, with progress and cancelling, the action `~/optimize`.
 
     Owns the worker processes. Does not own the queue's rules (`solve.worker`) nor what a solve is
-    (`background`).
+    (`jobs.gaits`).
     """
 
     def __init__(self) -> None:

@@ -39,7 +39,7 @@ class NoTransitionError(WalkOptimizerError):
 class TransitionPlanner:
     """Finds certified steps: in memory, in the user's cache, or by a solve in a worker process.
 
-    Owns the process. Does not own what a solve is (`transition_job`), nor what is walked.
+    Owns the process. Does not own what a solve is (`jobs.transitions`), nor what is walked.
     """
 
     def __init__(self, node: SuiteNode) -> None:
