@@ -120,12 +120,23 @@ class Starter:
         log = self._logs / f"{name}_{len(self.nodes)}.log"
         node = NodeProcess(name, log, arguments, os.environ)
         self.nodes.append(node)
+        # Others wait for a library no longer than seconds; a test machine may take more to start it.
+        if name == "gait_library" and parameters.get("autostart", True):
+            _await_start(node)
         return node
 
     def close(self):
         for node in self.nodes:
             node.kill()
             print(f"--- what {node.name} printed:\n{node.output()}")  # pytest shows it where a test failed.
+
+
+def _await_start(node):
+    """Wait until a node is ready, or has ended because it can't start."""
+    deadline = time.monotonic() + PATIENCE
+    while "ready" not in node.output() and node.exit_code is None:
+        assert time.monotonic() < deadline, f"{node.name} took too long: {node.output()}"
+        time.sleep(0.05)
 
 
 def assert_left_cleanly(node, code):

@@ -13,7 +13,7 @@ from nodes.walking import NODE, Walker, assert_continuous
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
-from walk_optimizer_interfaces.srv import GetGait, StartRecording
+from walk_optimizer_interfaces.srv import StartRecording
 
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.recording import describe_bag
@@ -181,8 +181,6 @@ def test_two_walkers_in_one_graph_walk_each_for_itself(graph, start, stocked):
         start(NODE, namespace=name, longest_gap=10.0, rate=100.0, **own)
     one, two = (Walker(graph, name) for name in names)
     joints = [walker.listen(JointState, "joint_reference") for walker in (one, two)]
-    for name in names:  # A speed is refused where its library takes seconds longer to start.
-        graph.client(GetGait, f"{name}/gait_library/get_gait")
     one.talk(Float64, "target_speed").publish(Float64(data=SLOW))
     two.talk(Float64, "target_speed").publish(Float64(data=FAST))
     one.wait_for("walking", SLOW)
