@@ -89,18 +89,16 @@ class _Note:
 
     def functions(self) -> dict[str, ca.Function] | None:
         """Return the functions of the library; None without the note, or where the library does not load."""
+        noted = self._read()
         try:
-            note = json.loads(self._path.read_text())
-            return _loaded(note["functions"], cache_folder() / note["library"])
-        except (OSError, ValueError, TypeError, KeyError, RuntimeError):
+            return None if noted is None else _loaded(noted[1], noted[0])
+        except RuntimeError:
             return None
 
     def library(self) -> Path | None:
         """Return the library; None without the note."""
-        try:
-            return cache_folder() / str(json.loads(self._path.read_text())["library"])
-        except (OSError, ValueError, TypeError, KeyError):
-            return None
+        noted = self._read()
+        return None if noted is None else noted[0]
 
     def write(self, library: Path, functions: list[str]) -> None:
         """Write the note.
@@ -111,6 +109,14 @@ class _Note:
         scratch = self._path.with_suffix(f".{os.getpid()}")
         scratch.write_text(json.dumps({"library": library.name, "functions": functions}))
         scratch.replace(self._path)
+
+    def _read(self) -> tuple[Path, list[str]] | None:
+        """Return the library and the names of its functions; None without a note that can be read."""
+        try:
+            note = json.loads(self._path.read_text())
+            return cache_folder() / str(note["library"]), [str(name) for name in note["functions"]]
+        except (OSError, ValueError, TypeError, KeyError):
+            return None
 
 
 def _library(functions: dict[str, ca.Function], compiler: str) -> Path:
