@@ -38,8 +38,8 @@ LINEAR = 1.05  # exponent that counts as linear, for the noise of the times
 RESOLVE_NOTE = """\
 The start is the table's gait of the next lower speed; the new speed is a tenth of the way, or half of
 it, to the next one. Ours is the [condensed method](../architecture.md#near-starts) to the tolerance of
-plain, with its certificate and whatever meshes it takes. *Again* is the same solve a second time in the
-same process: ours as a running node asks for it, and what the ratios and the part of the step's
+plain, with its certificate and whatever meshes it takes. *Again* is the median of five such solves more in
+the same process: ours as a running node asks for it, and what the ratios and the part of the step's
 duration go by. *Plain* has the same start and keeps its mesh, without estimating its error; it is
 compared as its script runs, with building its problem, and once without. *Plain without a library*
 searches from its own starts on the report's grid and refines what it finds, on the same mesh. F is the
@@ -84,7 +84,7 @@ def resolve(bench: Bench) -> str:
 
 
 def _repeated(measured: Measured) -> float:
-    """Return the wall time of the second run; not a number of a solve that failed."""
+    """Return the wall time of runs after the first; not a number of a solve that failed."""
     score = score_of(measured)
     return math.nan if score is None else score.again
 
