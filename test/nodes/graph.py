@@ -13,13 +13,10 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from walk_optimizer.cli.processes import NodeProcess
-from walk_optimizer.nodes.remote_service import RemoteService
 
 # Far longer than anything takes on a machine that does nothing else.
 PATIENCE = 180.0
 SETTLING = 0.3
-# How long a service's node is given to tell that it lives; one that is not of the suite does not.
-ACQUAINTANCE = 3.0
 
 
 class Graph:
@@ -50,11 +47,11 @@ class Graph:
     def client(self, kind, name):
         """Return a client that the service knows."""
         if name not in self._clients:
-            self._clients[name] = service = RemoteService(self.node, kind, name)
-            self.spin_until(lambda: service.available, f"service {name}")
-            settled = time.monotonic() + ACQUAINTANCE
-            self.spin_until(lambda: service.will_answer or time.monotonic() > settled, "its life")
-        return self._clients[name].client
+            self._clients[name] = client = self.node.create_client(kind, name)
+            self.spin_until(client.service_is_ready, f"service {name}")
+            # We know the service; ROS does not tell when it knows us, and drops answers until then.
+            self.spin_for(SETTLING)
+        return self._clients[name]
 
     def offered(self, node, name):
         """Return whether a node without a namespace offers a service of that full name."""
@@ -62,7 +59,7 @@ class Graph:
 
     def forget(self, name):
         """Make the client of a service anew when it is used again."""
-        self._clients.pop(name).destroy()
+        self.node.destroy_client(self._clients.pop(name))
 
     def send(self, kind, name, **fields):
         """Return the future of a response."""

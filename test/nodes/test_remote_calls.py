@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,6 +10,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from nodes.graph import SETTLING
 from nodes.silent_node import FOREVER, Silent
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -52,17 +54,25 @@ class Call:
         self._reasons.append("superseded")
 
 
-def test_a_call_that_nobody_wants_any_more_ends_before_its_answer(graph, asking):
-    silent = Silent()
+@contextmanager
+def silent_node(graph, announced=True):
+    """Have the silent node in this process, until its end has been told to those that listen."""
+    silent = Silent(announced)
     graph.executor.add_node(silent)
-    call = Call(graph, asking, "/silent/ask")
-    graph.spin_until(lambda: silent.asked or call.task.done(), "the question")
-    graph.spin_for(0.3)
-    assert not call.task.done()
-    call.supersede()
-    assert isinstance(graph.result(call.task), SupersededError)
+    yield silent
     graph.executor.remove_node(silent)
     silent.destroy_node()
+    graph.spin_for(SETTLING)
+
+
+def test_a_call_that_nobody_wants_any_more_ends_before_its_answer(graph, asking):
+    with silent_node(graph) as silent:
+        call = Call(graph, asking, "/silent/ask")
+        graph.spin_until(lambda: silent.asked or call.task.done(), "the question")
+        graph.spin_for(0.3)
+        assert not call.task.done()
+        call.supersede()
+        assert isinstance(graph.result(call.task), SupersededError)
 
 
 def test_a_call_that_nobody_wants_any_more_does_not_wait_for_a_service_that_may_still_come(graph, asking):
@@ -118,25 +128,19 @@ def test_a_call_ends_when_its_node_is_killed_also_if_another_is_there_at_once(gr
 
 def test_a_service_is_called_once_its_node_has_told_of_its_life(graph, asking, monkeypatch):
     monkeypatch.setattr("walk_optimizer.nodes.suite_node._DISCOVERY", FOREVER)
-    silent = Silent(announced=False)
-    graph.executor.add_node(silent)
-    call = Call(graph, asking, "/silent/ask")
-    graph.spin_until(lambda: call.service.available, "the service")
-    graph.spin_for(1.0)
-    assert not silent.asked
-    silent.announce()
-    graph.spin_until(lambda: silent.asked, "the question")
-    graph.executor.remove_node(silent)
-    silent.destroy_node()
+    with silent_node(graph, announced=False) as silent:
+        call = Call(graph, asking, "/silent/ask")
+        graph.spin_until(lambda: call.service.available, "the service")
+        graph.spin_for(1.0)
+        assert not silent.asked
+        silent.announce()
+        graph.spin_until(lambda: silent.asked, "the question")
 
 
 def test_a_service_whose_node_tells_no_life_is_called_none_the_less(graph, asking):
-    silent = Silent(announced=False)
-    graph.executor.add_node(silent)
-    Call(graph, asking, "/silent/ask")
-    graph.spin_until(lambda: silent.asked, "the question")
-    graph.executor.remove_node(silent)
-    silent.destroy_node()
+    with silent_node(graph, announced=False) as silent:
+        Call(graph, asking, "/silent/ask")
+        graph.spin_until(lambda: silent.asked, "the question")
 
 
 def test_a_death_counts_once_whatever_tells_of_it_first(asking):

@@ -21,7 +21,6 @@ from walk_optimizer.gait import Gait
 from walk_optimizer.model.parameters import WalkerParameters
 from walk_optimizer.nodes.conversions import gait_from_message
 from walk_optimizer.nodes.qos import LATCHED, STREAM
-from walk_optimizer.nodes.remote_service import RemoteService
 from walk_optimizer.nodes.streamed_gait import ReceivedGait
 from walk_optimizer.nodes.suite_node import ServiceUnavailableError
 from walk_optimizer.references import JOINTS
@@ -29,6 +28,8 @@ from walk_optimizer.references.check import CycleMatcher
 from walk_optimizer.request import GaitRequest
 
 _POLL = 0.05
+# ROS tells when we know a service, not when it knows us; until then its answers are lost, [s].
+_SETTLING = 0.5
 
 
 @dataclass(frozen=True)
@@ -137,13 +138,14 @@ class DemoClient:
         self._state = message.state
 
     def _call(self, kind: Any, name: str, request: Any, timeout: float = 30.0) -> Any:
-        service = RemoteService(self._node, kind, name)
+        client = self._node.create_client(kind, name)
         try:
-            self.wait(lambda: service.will_answer, 60.0, f"waiting for {name}")
-            future = service.client.call_async(request)
+            self.wait(client.service_is_ready, 60.0, f"waiting for {name}")
+            self.pause(_SETTLING)
+            future = client.call_async(request)
             self.wait(future.done, timeout, name)
         finally:
-            service.destroy()
+            self._node.destroy_client(client)
         answer = future.result()
         if not answer.success:
             raise SolveFailedError(f"{name}: {answer.message}")

@@ -45,21 +45,20 @@ class RemoteService:
         losses: How often a node that offers the service has gone, also if another was there at once.
     """
 
-    def __init__(self, node: Node, kind: type, name: str, group: CallbackGroup | None = None) -> None:
+    def __init__(self, node: Node, kind: type, name: str, group: CallbackGroup) -> None:
         """Look for a service and for the life of its node.
 
         Args:
             node: That asks.
             kind: Service type.
             name: Of the service, which is `~/something` of a node of the suite.
-            group: Callback group of the client; the node's own by default.
+            group: Callback group of the client.
         """
-        self._node = node
         self.client: Client = node.create_client(kind, name, qos_profile=SERVICE, callback_group=group)
         self.losses, self._lost = 0, False
         self._life, self._mute = "", False
         folder = self.name.rpartition("/")[0]
-        self._lives = node.create_subscription(
+        node.create_subscription(
             String,
             f"{folder}/alive",
             self._on_start,
@@ -86,11 +85,6 @@ class RemoteService:
     def take_for_mute(self) -> None:
         """Take note that the service's node has told no life for long: it is none of the suite."""
         self._mute = True
-
-    def destroy(self) -> None:
-        """Look for the service no more."""
-        self._node.destroy_subscription(self._lives)
-        self._node.destroy_client(self.client)
 
     def finding(self, noun: str, without_it: str) -> Finding:
         """Return whether the service is there, for operators.
