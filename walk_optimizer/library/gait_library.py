@@ -21,7 +21,6 @@ from walk_optimizer.gait_files.access import files_in, writable_folder
 from walk_optimizer.gait_files.codec import encode
 from walk_optimizer.library.entries import GaitSummary, LibraryEntry, Source, summarize, table_order
 from walk_optimizer.library.selection import (
-    EXACT_SPEED_TOLERANCE,
     Query,
     Selection,
     parse_selection,
@@ -31,19 +30,6 @@ from walk_optimizer.model.parameters import SpringMode, WalkerParameters
 from walk_optimizer.optimizer.comparison import best_of_both
 from walk_optimizer.request import TABLE_SPEED_TOLERANCE, gait_table_settings
 from walk_optimizer.resources import data_folder
-
-__all__ = [
-    "EXACT_SPEED_TOLERANCE",
-    "GaitLibrary",
-    "GaitSummary",
-    "LibraryEntry",
-    "Selection",
-    "Source",
-    "cache_folder",
-    "existing_folder",
-    "parse_selection",
-    "table_folder",
-]
 
 
 def table_folder() -> Path:
